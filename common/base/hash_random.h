@@ -6,13 +6,22 @@
 
 namespace af {
 
+/// splitmix64's finaliser (Steele, Lea, Flood, OOPSLA 2014).
+inline std::uint64_t hash_mix(std::uint64_t x) {
+  x += 0x9E3779B97F4A7C15ull;
+  x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9ull;
+  x = (x ^ (x >> 27)) * 0x94D049BB133111EBull;
+  return x ^ (x >> 31);
+}
+
 /// Counter-based random numbers: a value depends only on its keys (seed, stream, index, ...), never
-/// on how many were drawn before or on which rank draws it. The mixer is splitmix64's finaliser
-/// (Steele, Lea, Flood, OOPSLA 2014), applied once per key.
-std::uint64_t hash64(std::uint64_t a,
-                     std::uint64_t b = 0,
-                     std::uint64_t c = 0,
-                     std::uint64_t d = 0);
+/// on how many were drawn before or on which rank draws it. The mixer is applied once per key.
+inline std::uint64_t hash64(std::uint64_t a,
+                            std::uint64_t b = 0,
+                            std::uint64_t c = 0,
+                            std::uint64_t d = 0) {
+  return hash_mix(hash_mix(hash_mix(hash_mix(a) ^ b) ^ c) ^ d);
+}
 
 /// Hash of a name (for example a case name), to be used as a key. FNV-1a followed by the mixer.
 std::uint64_t hash_name(std::string_view name);

@@ -11,19 +11,10 @@
 
 namespace af {
 
-namespace {
-
 using Eigen::Vector3d;
 
-/// A surface of a body on a ray.
-struct Crossing {
-  double at_mm;
-  int solid;
-  bool is_entry;
-};
-
 /// The bodies around the present point of a ray; the one that was painted last is what is there.
-class OpenBodies {
+class SolidProjector::OpenBodies {
  public:
   void apply(const Crossing& crossing) {
     if (crossing.is_entry) {
@@ -38,8 +29,6 @@ class OpenBodies {
  private:
   std::vector<int> open_;  ///< ascending
 };
-
-}  // namespace
 
 SolidProjector::SolidProjector(const Phantom& phantom,
                                const TissueModel& tissue,
@@ -75,7 +64,13 @@ std::vector<SolidProjector::Piece> SolidProjector::pieces(const Vector3d& source
     last_mm = std::min(last_mm, std::max(a, b));
   }
   if (!(first_mm < last_mm)) return {};
-  if (!motion_) return {{source_point + first_mm * direction, direction, last_mm - first_mm, 1.0}};
+  if (!motion_)
+    return {{first_mm,
+             last_mm,
+             source_point + first_mm * direction,
+             direction,
+             last_mm - first_mm,
+             1.0}};
   std::vector<Piece> found;
   const int count = static_cast<int>(std::ceil((last_mm - first_mm) / kPieceMm));
   const double step_mm = (last_mm - first_mm) / count;
@@ -87,7 +82,12 @@ std::vector<SolidProjector::Piece> SolidProjector::pieces(const Vector3d& source
   for (int i = 0; i < count; ++i) {
     const Vector3d to = in_anatomy(i + 1);
     const double length_mm = (to - from).norm();
-    found.push_back({from, (to - from) / length_mm, length_mm, step_mm / length_mm});
+    found.push_back({first_mm + i * step_mm,
+                     first_mm + (i + 1) * step_mm,
+                     from,
+                     (to - from) / length_mm,
+                     length_mm,
+                     step_mm / length_mm});
     from = to;
   }
   return found;
@@ -125,27 +125,47 @@ void SolidProjector::add_span(const Piece& piece,
   }
 }
 
-void SolidProjector::add_piece(const Piece& piece,
-                               const std::vector<int>& candidates,
-                               PathIntegrals& sum) const {
-  std::vector<Crossing> crossings;
-  for (const int candidate : candidates) {
-    const auto index = static_cast<std::size_t>(candidate);
-    const Vector3d to_center = balls_[index].center_mm - piece.origin;
-    const double nearest_mm = std::clamp(to_center.dot(piece.direction), 0.0, piece.length_mm);
-    if ((to_center - nearest_mm * piece.direction).norm() > balls_[index].radius_mm) continue;
-    for (const Chord& chord : chords(solids_[index], piece.origin, piece.direction)) {
+std::vector<SolidProjector::Candidate> SolidProjector::candidates(const Vector3d& source_point,
+                                                                  const Vector3d& direction) const {
+  // Motion takes no point of the ray farther from it than this.
+  const double slack_mm = motion_ ? motion_->largest_mm() : 0.0;
+  std::vector<Candidate> found;
+  for (std::size_t i = 0; i < balls_.size(); ++i) {
+    const Vector3d to_center = balls_[i].center_mm - source_point;
+    const double nearest_mm = to_center.dot(direction);
+    const double reach_mm = balls_[i].radius_mm + slack_mm;
+    const double inside = reach_mm * reach_mm - (to_center - nearest_mm * direction).squaredNorm();
+    if (inside < 0.0) continue;
+    const double half_mm = std::sqrt(inside);
+    found.push_back({static_cast<int>(i), nearest_mm - half_mm, nearest_mm + half_mm});
+  }
+  return found;
+}
+
+void SolidProjector::find_crossings(const Piece& piece,
+                                    const std::vector<Candidate>& candidates,
+                                    std::vector<Crossing>& crossings) const {
+  crossings.clear();
+  for (const Candidate& candidate : candidates) {
+    if (candidate.last_mm < piece.first_mm || candidate.first_mm > piece.last_mm) continue;
+    const Solid& solid = solids_[static_cast<std::size_t>(candidate.solid)];
+    for (const Chord& chord : chords(solid, piece.origin, piece.direction)) {
       const double first_mm = std::max(chord.first_mm, 0.0);
       const double last_mm = std::min(chord.last_mm, piece.length_mm);
       if (!(first_mm < last_mm)) continue;
-      crossings.push_back({first_mm, candidate, true});
-      crossings.push_back({last_mm, candidate, false});
+      crossings.push_back({first_mm, candidate.solid, true});
+      crossings.push_back({last_mm, candidate.solid, false});
     }
   }
   std::sort(crossings.begin(), crossings.end(), [](const Crossing& a, const Crossing& b) {
     return std::pair(a.at_mm, a.is_entry) < std::pair(b.at_mm, b.is_entry);
   });
-  OpenBodies open;
+}
+
+void SolidProjector::add_piece(const Piece& piece,
+                               const std::vector<Crossing>& crossings,
+                               OpenBodies& open,
+                               PathIntegrals& sum) const {
   double at_mm = 0.0;
   for (const Crossing& crossing : crossings) {
     if (!open.is_empty())
@@ -158,18 +178,14 @@ void SolidProjector::add_piece(const Piece& piece,
 PathIntegrals SolidProjector::integrate(const Vector3d& source_point,
                                         const Vector3d& through_point) const {
   const Vector3d direction = (through_point - source_point).normalized();
-  const std::vector<Piece> way = pieces(source_point, direction);
-  // Motion takes no point of the ray farther from it than this.
-  const double slack_mm = motion_ ? motion_->largest_mm() : 0.0;
-  std::vector<int> candidates;
-  for (std::size_t i = 0; i < balls_.size(); ++i) {
-    const Vector3d to_center = balls_[i].center_mm - source_point;
-    const double reach_mm = balls_[i].radius_mm + slack_mm;
-    if ((to_center - to_center.dot(direction) * direction).squaredNorm() <= reach_mm * reach_mm)
-      candidates.push_back(static_cast<int>(i));
-  }
+  const std::vector<Candidate> near = candidates(source_point, direction);
+  std::vector<Crossing> crossings;
+  OpenBodies open;
   PathIntegrals sum;
-  for (const Piece& piece : way) add_piece(piece, candidates, sum);
+  for (const Piece& piece : pieces(source_point, direction)) {
+    find_crossings(piece, near, crossings);
+    add_piece(piece, crossings, open, sum);
+  }
   return sum;
 }
 

@@ -32,8 +32,23 @@ class SolidProjector : public RayIntegrator {
     Eigen::Vector3d center_mm;
     double radius_mm;
   };
+  /// A surface of a body on a piece.
+  struct Crossing {
+    double at_mm;
+    int solid;
+    bool is_entry;
+  };
+  class OpenBodies;
+  /// A body that the X-ray's ray may cross, and where on it.
+  struct Candidate {
+    int solid;
+    double first_mm;
+    double last_mm;
+  };
   /// A straight piece of the way through the anatomy.
   struct Piece {
+    double first_mm;  ///< on the X-ray's ray
+    double last_mm;
     Eigen::Vector3d origin;
     Eigen::Vector3d direction;  ///< unit
     double length_mm;           ///< in the anatomy
@@ -42,7 +57,16 @@ class SolidProjector : public RayIntegrator {
 
   [[nodiscard]] std::vector<Piece> pieces(const Eigen::Vector3d& source_point,
                                           const Eigen::Vector3d& direction) const;
-  void add_piece(const Piece& piece, const std::vector<int>& candidates, PathIntegrals& sum) const;
+  [[nodiscard]] std::vector<Candidate> candidates(const Eigen::Vector3d& source_point,
+                                                  const Eigen::Vector3d& direction) const;
+  /// Crossings with surfaces along the piece, in order.
+  void find_crossings(const Piece& piece,
+                      const std::vector<Candidate>& candidates,
+                      std::vector<Crossing>& crossings) const;
+  void add_piece(const Piece& piece,
+                 const std::vector<Crossing>& crossings,
+                 OpenBodies& open,
+                 PathIntegrals& sum) const;
   void add_span(const Piece& piece,
                 const Solid& solid,
                 double first_mm,
