@@ -90,8 +90,12 @@ void describe_chains(Fields& field, MethodOptions& options) {
         "measure must be rg, its optimiser is ignored (default: the preset's)");
   field("judge_least_value", options.judge_least_value, "Ends below it are failures")
       .no_option("the preset's");
-  field("judge_enough_value", options.judge_enough_value, "An end above it is taken")
-      .no_option("the preset's");
+  field("judge_enough_value",
+        options.judge_enough_value,
+        "A portfolio (robust) ends with the first chain whose end is worth this to the judge: the "
+        "share of the X-rays' gradients that it explains, mean over the views. 0: the first chain "
+        "alone; 1: never (default: the preset's, 0.6)")
+      .within(0.0, 1.0);
   field("bins", options.bins, "Histogram bins per axis, 2 to 256 (default: 64)").not_recorded(why);
   field("smoothing_sigma_mm",
         options.smoothing_sigma_mm,

@@ -66,6 +66,18 @@ TEST(MethodOptions, ChainsLeaveThePresetsFinishBehindUnlessOneIsTyped) {
   EXPECT_THROW(resolve(options), InputError);
 }
 
+TEST(MethodOptions, SayWhichEndIsEnoughForAPortfolio) {
+  MethodOptions options;
+  EXPECT_EQ(resolve(options).judge.enough_value, preset_options("robust").judge.enough_value);
+  options.judge_enough_value = 0.25;
+  EXPECT_EQ(resolve(options).judge.enough_value, 0.25);
+  EXPECT_EQ(options.in_force().judge_enough_value, 0.25);
+  for (const double outside : {-0.1, 1.1, std::numeric_limits<double>::quiet_NaN()}) {
+    options.judge_enough_value = outside;
+    EXPECT_THROW(resolve(options), InputError) << outside;
+  }
+}
+
 TEST(MethodOptions, InForceAreTheSameMethodAgain) {
   for (const std::string& preset : preset_names()) {
     MethodOptions options;
