@@ -83,6 +83,39 @@ double lattice_value(std::int64_t i, std::int64_t j, std::int64_t k) {
   return 2.0 * static_cast<double>(bits >> 11) * 0x1.0p-53 - 1.0;
 }
 
+/// Corners of the lattice's cells that a thread was in: it comes back to them, and neighbouring
+/// rays pass through the same ones.
+class LatticeCells {
+ public:
+  LatticeCells() : cells_(kCells) {}
+
+  const std::array<double, 8>& corners_of(const std::array<std::int64_t, 3>& at) {
+    // Cells along a ray and beside it fall into different places.
+    Cell& cell = cells_[static_cast<std::size_t>(at[0] + 37 * at[1] + 331 * at[2]) % kCells];
+    if (cell.is_empty || cell.at != at) fill(cell, at);
+    return cell.corners;
+  }
+
+ private:
+  struct Cell {
+    std::array<std::int64_t, 3> at{};
+    std::array<double, 8> corners{};
+    bool is_empty = true;
+  };
+  static constexpr std::size_t kCells = 1024;  ///< 96 KiB
+
+  static void fill(Cell& cell, const std::array<std::int64_t, 3>& at) {
+    for (std::size_t corner = 0; corner < cell.corners.size(); ++corner)
+      cell.corners[corner] = lattice_value(at[0] + static_cast<std::int64_t>(corner & 1U),
+                                           at[1] + static_cast<std::int64_t>(corner >> 1U & 1U),
+                                           at[2] + static_cast<std::int64_t>(corner >> 2U));
+    cell.at = at;
+    cell.is_empty = false;
+  }
+
+  std::vector<Cell> cells_;
+};
+
 /// std::floor() without a call: X-rays read millions of texture points.
 std::int64_t floor_of(double x) {
   const auto whole = static_cast<std::int64_t>(x);
@@ -145,32 +178,22 @@ Solid capsule_between(const Eigen::Vector3d& a,
   return solid;
 }
 
-double TextureReader::at(const Eigen::Vector3d& ct_point_mm, double scale_mm) {
+double texture(const Eigen::Vector3d& ct_point_mm, double scale_mm) {
+  thread_local LatticeCells cells;
   const Eigen::Vector3d position = ct_point_mm / scale_mm;
   const std::array<std::int64_t, 3> cell{
       floor_of(position.x()), floor_of(position.y()), floor_of(position.z())};
-  if (is_empty_ || cell != cell_) {
-    for (std::size_t corner = 0; corner < corners_.size(); ++corner)
-      corners_[corner] = lattice_value(cell[0] + static_cast<std::int64_t>(corner & 1U),
-                                       cell[1] + static_cast<std::int64_t>(corner >> 1U & 1U),
-                                       cell[2] + static_cast<std::int64_t>(corner >> 2U));
-    cell_ = cell;
-    is_empty_ = false;
-  }
+  const std::array<double, 8>& corners = cells.corners_of(cell);
   const Eigen::Vector3d part = position - Eigen::Vector3d(static_cast<double>(cell[0]),
                                                           static_cast<double>(cell[1]),
                                                           static_cast<double>(cell[2]));
   const auto along_i = [&](std::size_t corner) {
-    return blend(corners_[corner], corners_[corner + 1], part.x());
+    return blend(corners[corner], corners[corner + 1], part.x());
   };
   const auto along_j = [&](std::size_t corner) {
     return blend(along_i(corner), along_i(corner + 2), part.y());
   };
   return blend(along_j(0), along_j(4), part.z());
-}
-
-double texture(const Eigen::Vector3d& ct_point_mm, double scale_mm) {
-  return TextureReader().at(ct_point_mm, scale_mm);
 }
 
 CtVolume sample_solids(const CtGrid& grid,

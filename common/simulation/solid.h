@@ -44,18 +44,6 @@ Solid capsule_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double
 /// lattice values.
 double texture(const Eigen::Vector3d& ct_point_mm, double scale_mm);
 
-/// The same for points one after the other: the cell of the lattice that the last one was in is
-/// kept.
-class TextureReader {
- public:
-  double at(const Eigen::Vector3d& ct_point_mm, double scale_mm);
-
- private:
-  std::array<std::int64_t, 3> cell_{};
-  std::array<double, 8> corners_{};
-  bool is_empty_ = true;
-};
-
 /// Bodies sampled on a grid with identity direction: every voxel is the mean HU of
 /// samples_per_axis^3 points, air (-1000 HU) elsewhere. The result does not depend on `threads`
 /// (0: as many as the hardware has).

@@ -114,13 +114,12 @@ void SolidProjector::add_span(const Piece& piece,
   const int steps =
       solid.texture_hu == 0 ? 1 : static_cast<int>(std::ceil(length_mm / kTextureStepMm));
   const double step_mm = length_mm / steps;
-  TextureReader reader;
   for (int i = 0; i < steps; ++i) {
     double hu = solid.hu;
     if (solid.texture_hu != 0)
-      hu += solid.texture_hu * reader.at(piece.origin + solid.texture_shift_mm +
-                                             (first_mm + (i + 0.5) * step_mm) * piece.direction,
-                                         solid.texture_scale_mm);
+      hu += solid.texture_hu * texture(piece.origin + solid.texture_shift_mm +
+                                           (first_mm + (i + 0.5) * step_mm) * piece.direction,
+                                       solid.texture_scale_mm);
     add_length(static_cast<int>(std::lround(hu)), step_mm * piece.stretch, sum);
   }
 }
