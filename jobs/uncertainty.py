@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """Whether registrations know their own errors: fits the constants of register/uncertainty/calibration.cpp to the
-registrations of a population study (jobs/population.sh), whose truth is known, on the patients of odd numbers, and
-prints how well they do on the others. Needs nothing but Python."""
+registrations from two views of a population study (jobs/population.sh), whose truth is known, on the patients of odd
+numbers, and prints how well they do on the others. Patients that were not drawn, which have no number, are never fitted.
+Needs nothing but Python."""
 import argparse
 import csv
 import math
+import os
 import pathlib
 import random
 import re
@@ -19,6 +21,11 @@ NEAR_MM, FAR_MM = 0.001, 20.0
 LEAST_SHARE = 0.05
 
 
+# What is read of a table of registrations.
+COLUMNS = ["case", "tre_mm", "judge_fine_mean", "judge_fine_background", "covariance_inflation", "tre_inflation",
+           "squared_distance", "predicted_tre_rms_mm", "predicted_tre_95_mm", "confidence"]
+
+
 class Row:
     """What is needed of one registration."""
 
@@ -30,8 +37,8 @@ class Row:
         self.variant = variant
         self.case = f"{cells['case']} {variant}"
         self.patient = re.sub(r"-p\d+$", "", cells["case"])
-        number_of_patient = re.search(r"-(\d+)-p\d+$", cells["case"])
-        self.is_for_fit = number_of_patient is not None and int(number_of_patient[1]) % 2 == 1
+        drawn = re.fullmatch(r"(?:spine|pelvis|head)-(\d{3,})-p\d+", cells["case"])
+        self.is_for_fit = drawn is not None and int(drawn[1]) % 2 == 1
         self.tre = number("tre_mm")
         self.is_success = self.tre < SUCCESS_TRE_MM
         self.fine_mean = number("judge_fine_mean")
@@ -234,6 +241,8 @@ def fit(rows, measures):
     for measure in measures:
         mine = [r for r in rows if r.measure == measure]
         fitted = [r for r in mine if r.is_for_fit and r.is_success and not math.isnan(r.distance)]
+        if not fitted:
+            refuse(measure, "no registration of a patient of odd number succeeded and says how far it may be off; --judge fits nothing")
         # Never less than the sandwich itself, which holds where the pose explains the X-rays. A TRE adds up what all six
         # directions do, and may be foretold too large.
         pose = fit_inflation(fitted, [row.distance / REGION_95 for row in fitted], 0.0)
@@ -261,47 +270,60 @@ def take_as_stated(rows):
 
 def options():
     parser = argparse.ArgumentParser(
-        description=__doc__, epilog="Exit codes: 0 done, 2 wrong options, 4 no registrations, or none with predictions."
+        description=__doc__, epilog="Exit codes: 0 done, 2 wrong options, 4 registrations that are missing, damaged or without predictions, or none to fit."
     )
     parser.add_argument("population", nargs="+", type=pathlib.Path, help="output folders of jobs/population.sh")
     parser.add_argument("--presets", default="robust,fast", help="comma separated [%(default)s]")
     parser.add_argument("--variants", default="clean,all", help="comma separated, as in the population [%(default)s]")
-    parser.add_argument("--views", type=int, choices=(1, 2), default=2, help="registrations from so many [%(default)s]")
     parser.add_argument("--judge", action="store_true", help="fit nothing: judge all patients by what the programs foretold")
     parser.add_argument("--csv", metavar="FILE", help="the table, as CSV")
     parser.add_argument("--commit", metavar="HASH", help="a last column of it: the commit of the programs")
     chosen = parser.parse_args()
-    chosen.presets = chosen.presets.split(",")
-    chosen.variants = chosen.variants.split(",")
+    chosen.presets = list(dict.fromkeys(chosen.presets.split(",")))
+    chosen.variants = list(dict.fromkeys(chosen.variants.split(",")))
     for preset in chosen.presets:
         if preset not in MEASURE_OF:
             parser.error(f"--presets names '{preset}': must be some of {', '.join(MEASURE_OF)}")
     return chosen
 
 
-def refuse(path, why):
-    print(f"error: {path}: {why}", file=sys.stderr)
+def refuse(what, why):
+    print(f"error: {what}: {why}", file=sys.stderr)
     sys.exit(4)
 
 
 def rows_of(path, measure, variant):
     with open(path, newline="", encoding="utf-8") as file:
         table = csv.DictReader(file)
-        if "squared_distance" not in (table.fieldnames or []):
-            refuse(path, "has no column 'squared_distance': made with --no-uncertainty, or not a table of registrations")
-        return [Row(measure, variant, cells) for cells in table]
+        missing = [column for column in COLUMNS if column not in (table.fieldnames or [])]
+        if missing:
+            refuse(path, f"has no column '{missing[0]}': made with --no-uncertainty, or no table of registrations")
+        rows = []
+        for cells in table:
+            if any(cells[column] is None for column in COLUMNS):
+                refuse(path, f"line {table.line_num} is cut off")
+            rows.append(Row(measure, variant, cells))
+    if not rows:
+        refuse(path, "holds no registration")
+    return rows
+
+
+def finished_tables(population, condition):
+    """Tables of finished runs of one machine, and of a cluster."""
+    runs = [*population.glob(f"runs/{condition}/*"), *population.glob(f"slurm/{condition}/registration/*")]
+    return [run / "registrations.csv" for run in sorted(runs) if (run / "summary.json").exists()]
 
 
 def rows_of_populations(chosen):
-    """All registrations of the runs CONDITION/PATIENT of all folders; a patient may be in one of them alone."""
+    """All registrations of all folders; a patient may be in one of them alone."""
     rows, seen = [], {}
     for preset in chosen.presets:
         for variant in chosen.variants:
-            condition = f"{variant}-{chosen.views}-{preset}"
+            condition = f"{variant}-2-{preset}"
             for folder in chosen.population:
-                tables = sorted(folder.glob(f"runs/{condition}/*/registrations.csv"))
+                tables = finished_tables(folder, condition)
                 if not tables:
-                    refuse(folder, f"holds no runs/{condition}/PATIENT/registrations.csv of jobs/population.sh")
+                    refuse(folder, f"holds no finished run of {condition} of jobs/population.sh")
                 for path in tables:
                     run = f"{condition}/{path.parent.name}"
                     if run in seen:
@@ -335,6 +357,8 @@ def write_csv(path, table, commit):
 
 def main():
     chosen = options()
+    if chosen.csv and not os.access(pathlib.Path(chosen.csv).parent, os.W_OK):
+        refuse(chosen.csv, "its folder is missing or cannot be written to")
     rows = rows_of_populations(chosen)
     measures = list(dict.fromkeys(row.measure for row in rows))
     if chosen.judge:

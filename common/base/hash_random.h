@@ -6,7 +6,7 @@
 
 namespace af {
 
-/// splitmix64's finaliser (Steele, Lea, Flood, OOPSLA 2014).
+/// A step of splitmix64: its increment and finaliser (Steele, Lea, Flood, OOPSLA 2014).
 inline std::uint64_t hash_mix(std::uint64_t x) {
   x += 0x9E3779B97F4A7C15ull;
   x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9ull;

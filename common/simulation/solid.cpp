@@ -2,7 +2,9 @@
 #include "simulation/solid.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <utility>
 
 #include "base/error.h"
@@ -91,7 +93,8 @@ class LatticeCells {
 
   const std::array<double, 8>& corners_of(const std::array<std::int64_t, 3>& at) {
     // Cells along a ray and beside it fall into different places.
-    Cell& cell = cells_[static_cast<std::size_t>(at[0] + 37 * at[1] + 331 * at[2]) % kCells];
+    const auto part = [&](std::size_t axis) { return static_cast<std::uint64_t>(at[axis]); };
+    Cell& cell = cells_[(part(0) + 37 * part(1) + 331 * part(2)) % kCells];
     if (cell.is_empty || cell.at != at) fill(cell, at);
     return cell.corners;
   }

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
-#include <cstdint>
 #include <vector>
 
 #include "geometry/slab_sizing.h"
@@ -41,7 +39,8 @@ struct Solid {
 Solid capsule_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double radius_mm, int hu);
 
 /// Smooth deterministic noise in [-1, 1], correlated over `scale_mm`: trilinear blends of hashed
-/// lattice values.
+/// lattice values. For points within 1e15 scales of the origin.
+/// \test Texture.BlendsTheLatticeWhateverCameBefore
 double texture(const Eigen::Vector3d& ct_point_mm, double scale_mm);
 
 /// Bodies sampled on a grid with identity direction: every voxel is the mean HU of

@@ -146,7 +146,8 @@ void SolidProjector::find_crossings(const Piece& piece,
                                     std::vector<Crossing>& crossings) const {
   crossings.clear();
   for (const Candidate& candidate : candidates) {
-    if (candidate.last_mm < piece.first_mm || candidate.first_mm > piece.last_mm) continue;
+    if (candidate.ray_last_mm < piece.ray_first_mm || candidate.ray_first_mm > piece.ray_last_mm)
+      continue;
     const Solid& solid = solids_[static_cast<std::size_t>(candidate.solid)];
     for (const Chord& chord : chords(solid, piece.origin, piece.direction)) {
       const double first_mm = std::max(chord.first_mm, 0.0);

@@ -42,13 +42,13 @@ class SolidProjector : public RayIntegrator {
   /// A body that the X-ray's ray may cross, and where on it.
   struct Candidate {
     int solid;
-    double first_mm;
-    double last_mm;
+    double ray_first_mm;
+    double ray_last_mm;
   };
   /// A straight piece of the way through the anatomy.
   struct Piece {
-    double first_mm;  ///< on the X-ray's ray
-    double last_mm;
+    double ray_first_mm;  ///< on the X-ray's ray
+    double ray_last_mm;
     Eigen::Vector3d origin;
     Eigen::Vector3d direction;  ///< unit
     double length_mm;           ///< in the anatomy
@@ -63,6 +63,7 @@ class SolidProjector : public RayIntegrator {
   void find_crossings(const Piece& piece,
                       const std::vector<Candidate>& candidates,
                       std::vector<Crossing>& crossings) const;
+  /// `open` is empty before and after.
   void add_piece(const Piece& piece,
                  const std::vector<Crossing>& crossings,
                  OpenBodies& open,

@@ -2,6 +2,7 @@
 #include "register/method/method_options.h"
 
 #include "base/error.h"
+#include "base/number_text.h"
 #include "base/thread_pool.h"
 #include "register/method/presets.h"
 
@@ -92,9 +93,10 @@ void describe_chains(Fields& field, MethodOptions& options) {
       .no_option("the preset's");
   field("judge_enough_value",
         options.judge_enough_value,
-        "A portfolio (robust) ends with the first chain whose end is worth this to the judge: the "
-        "share of the X-rays' gradients that it explains, mean over the views. 0: the first chain "
-        "alone; 1: never (default: the preset's, 0.6)")
+        "For a portfolio: the first end that is worth this to the judge ends it, and no rivals are "
+        "finished; the worth is the share of the X-rays' gradients that an end explains, mean over "
+        "the views. 0: nearly always the first chain's end; 1: never (default: the preset's, 0.6 "
+        "of robust; 1 where chains are typed over another preset)")
       .within(0.0, 1.0);
   field("bins", options.bins, "Histogram bins per axis, 2 to 256 (default: 64)").not_recorded(why);
   field("smoothing_sigma_mm",
@@ -143,6 +145,9 @@ RegistrationOptions resolve(const MethodOptions& options) {
   if (options.max_evaluations.has_value()) result.max_evaluations = *options.max_evaluations;
   result.seed = options.seed;
   std::vector<std::string> found = problems(result);
+  if (options.judge_enough_value.has_value() && result.chains.size() < 2)
+    found.push_back("judge_enough_value = " + number_text(*options.judge_enough_value) +
+                    ": must be left out where the method is one chain, which nothing judges");
   for (const std::string& text : thread_problems(options.threads)) found.push_back(text);
   for (const std::string& text : field_problems(options)) found.push_back(text);
   throw_if_any(found);

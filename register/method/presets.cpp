@@ -64,7 +64,7 @@ ChainOptions again_chain(const std::string& name, const std::string& search) {
 }
 
 /// Three chains search with different measures, because each has its deepest optimum in a wrong
-/// place for some patients (docs/population.md). If none finds anything, a fourth searches more
+/// place for some patients (docs/robust-tuning.md). If none finds anything, a fourth searches more
 /// widely, by plain correlation: from starts far along a long object, the others went to its end,
 /// out of sight (docs/real-xrays.md). If none convinces, the last two search about the best end,
 /// finer than the others: where anatomy moved about the target, they ended some mm beside it.

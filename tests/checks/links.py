@@ -16,8 +16,8 @@ LINK = re.compile(r"!?\[(?:[^\[\]]|\[[^\]]*\])*\]\(([^()\s]+)(?:\s+\"[^\"]*\")?\
 HTML_LINK = re.compile(r"(?:href|src)=\"([^\"]+)\"")
 
 
-def without_code(text):
-    """The lines outside fenced blocks, without `code`; as many lines as before."""
+def outside_fences(text):
+    """The lines, those of fenced blocks empty; as many lines as before."""
     lines, fence = [], None
     for line in text.splitlines():
         mark = re.match(r"\s*(```+|~~~+)", line)
@@ -26,10 +26,15 @@ def without_code(text):
         elif fence is not None and line.strip().startswith(fence):
             fence = None
         elif fence is None:
-            lines.append(re.sub(r"`[^`]*`", "", line))
+            lines.append(line)
             continue
         lines.append("")
     return lines
+
+
+def without_code(text):
+    """The lines outside fenced blocks, without `code`; as many lines as before."""
+    return [re.sub(r"`[^`]*`", "", line) for line in outside_fences(text)]
 
 
 def slug(heading):

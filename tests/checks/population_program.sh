@@ -58,6 +58,23 @@ for condition in clean-1-fast clean-2-fast; do
 done
 grep -q sbatch out || fail "no command of Slurm: $(cat out)"
 
+uncertainty=(prefix/libexec/attenuation-fields/jobs/uncertainty.py --presets fast --variants clean)
+"${uncertainty[@]}" pop --judge --csv uncertainty.csv >out 2>err || fail "uncertainty.py: $(cat out err)"
+# gc, all, and all of clean X-rays.
+[[ $(wc -l <uncertainty.csv) == 4 ]] || fail "uncertainty.py wrote $(cat uncertainty.csv)"
+grep -q '^gc,"all, as stated",' uncertainty.csv || fail "uncertainty.py wrote $(cat uncertainty.csv)"
+refuse 2 "must be some of robust, fast, paper" "${uncertainty[@]}" --presets bone pop
+refuse 4 'holds no finished run of clean-2-fast' "${uncertainty[@]}" missing
+refuse 4 'has the same patient, too' "${uncertainty[@]}" pop pop
+refuse 4 'its folder is missing' "${uncertainty[@]}" pop --judge --csv nowhere/uncertainty.csv
+# Damaged tables; patients of even numbers alone, of whom nothing can be fitted.
+for damage in 's/,squared_distance//' '2s/,.*//' '2,$d' 's/^spine-001/spine-002/'; do
+  rm -rf damaged
+  cp -r pop damaged
+  sed -i "$damage" damaged/runs/clean-2-fast/spine-001/registrations.csv
+  refuse 4 'squared_distance\|is cut off\|holds no registration\|odd number' "${uncertainty[@]}" damaged
+done
+
 evaluate=("$programs/af-evaluate" population -o refused)
 refuse 2 'condition' "${evaluate[@]}"
 refuse 3 'NAME=FOLDER' "${evaluate[@]}" --condition pop

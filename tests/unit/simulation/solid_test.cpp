@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "simulation/solid.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -126,6 +128,39 @@ TEST(SampleSolids, VoxelsDoNotDependOnThreads) {
   const CtVolume one = sample_solids(cube_grid(40, 1.0), {body}, 2, 1);
   const CtVolume three = sample_solids(cube_grid(40, 1.0), {body}, 2, 3);
   EXPECT_TRUE(std::equal(one.hu.view().begin(), one.hu.view().end(), three.hu.view().begin()));
+}
+
+TEST(Texture, BlendsTheLatticeWhateverCameBefore) {
+  // Far more cells than are remembered, also far away and below zero, each point asked for twice.
+  const auto lattice = [](double i, double j, double k) {
+    const auto key = [](double x) {
+      return static_cast<std::uint64_t>(static_cast<std::int64_t>(x));
+    };
+    return 2.0 * static_cast<double>(hash64(key(i), key(j), key(k)) >> 11) * 0x1.0p-53 - 1.0;
+  };
+  std::vector<Vector3d> points;
+  for (int i = 0; i < 5000; ++i) {
+    HashRandom random(3, 4, static_cast<std::uint64_t>(i));
+    const double reach_mm = i % 2 == 0 ? 40.0 : 1e6;
+    const auto draw = [&] { return random.uniform(-reach_mm, reach_mm); };
+    points.emplace_back(draw(), draw(), draw());
+  }
+  const auto expect_blend = [&](const Vector3d& point) {
+    const Vector3d position = point / 3.0;
+    const Vector3d low = position.array().floor();
+    const Vector3d part = position - low;
+    double expected = 0.0;
+    for (const double i : {0.0, 1.0})
+      for (const double j : {0.0, 1.0})
+        for (const double k : {0.0, 1.0})
+          expected += lattice(low.x() + i, low.y() + j, low.z() + k) *
+                      (i == 0.0 ? 1.0 - part.x() : part.x()) *
+                      (j == 0.0 ? 1.0 - part.y() : part.y()) *
+                      (k == 0.0 ? 1.0 - part.z() : part.z());
+    EXPECT_NEAR(texture(point, 3.0), expected, 1e-14) << point.transpose();
+  };
+  std::for_each(points.begin(), points.end(), expect_blend);
+  std::for_each(points.rbegin(), points.rend(), expect_blend);
 }
 
 TEST(Texture, IsBoundedContinuousAndNotConstant) {

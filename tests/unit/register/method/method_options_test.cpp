@@ -76,6 +76,9 @@ TEST(MethodOptions, SayWhichEndIsEnoughForAPortfolio) {
     options.judge_enough_value = outside;
     EXPECT_THROW(resolve(options), InputError) << outside;
   }
+  options.judge_enough_value = 0.25;
+  options.preset = "fast";
+  EXPECT_THROW(resolve(options), InputError) << "one chain has no judge";
 }
 
 TEST(MethodOptions, InForceAreTheSameMethodAgain) {
