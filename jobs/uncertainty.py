@@ -366,7 +366,7 @@ def main():
         halves = {"all, as stated": False}
     else:
         fit(rows, measures)
-        halves = {"odd, fitted": True, "even, unseen": False}
+        halves = {"odd, fitted": True, "even, judged": False}
     table = tables_of(rows, measures, halves)
     print()
     for entry in table:
