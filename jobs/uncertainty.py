@@ -57,8 +57,9 @@ class Row:
         self.inflation = self.tre_inflation = 1.0
         self.confidence = 0.0
 
-    def misfit(self):
-        return -math.log(min(max(self.fine_mean, LEAST_SHARE), 1.0))
+    def shortfall(self):
+        """By how much the logarithm of the share that the pose explains falls short of that of EXPLAINED_SHARE."""
+        return max(0.0, math.log(EXPLAINED_SHARE / min(max(self.fine_mean, LEAST_SHARE), 1.0)))
 
     def features(self):
         """The distance of a portfolio's ends is none of them: where no portfolio fails it would stand for success."""
@@ -76,8 +77,9 @@ def weighted_quantile(values, weights, share):
     return pairs[-1][0]
 
 
-# What fit_inflation() tries: limits to what so few cases may say.
-SHARES = [0.4, 0.45, 0.5, 0.55, 0.6, 0.65]
+# As in calibration.cpp.
+EXPLAINED_SHARE = 0.65
+# What fit_inflation() tries: a limit to what so few cases may say.
 GROWTHS = [0.05 * i for i in range(161)]
 
 
@@ -91,24 +93,23 @@ def case_weights(rows):
 
 def fit_inflation(rows, squares, least):
     """Quantile regression (Koenker and Bassett 1978) of log squares, over those that 95 % should not exceed by the sandwich
-    alone, on the misfit beyond what all X-rays have, so that 95 % lie inside."""
+    alone, on the shortfall of what the pose explains, so that 95 % lie inside."""
     y = [math.log(max(square, 1e-6)) for square in squares]
+    x = [row.shortfall() for row in rows]
     weights = case_weights(rows)
     best = None
-    for share in SHARES:
-        x = [max(0.0, row.misfit() + math.log(share)) for row in rows]
-        for growth in GROWTHS:
-            rest = [b - growth * a for a, b in zip(x, y)]
-            at_once = max(least, weighted_quantile(rest, weights, 0.95))
-            loss = sum(w * ((0.95 if r > at_once else -0.05) * (r - at_once)) for r, w in zip(rest, weights))
-            if best is None or loss < best[0]:
-                best = (loss, at_once, growth, share)
+    for growth in GROWTHS:
+        rest = [b - growth * a for a, b in zip(x, y)]
+        at_once = max(least, weighted_quantile(rest, weights, 0.95))
+        loss = sum(w * ((0.95 if r > at_once else -0.05) * (r - at_once)) for r, w in zip(rest, weights))
+        if best is None or loss < best[0]:
+            best = (loss, at_once, growth)
     return best[1:]
 
 
 def inflation_of(row, constants):
-    at_once, growth, share_from = constants
-    return math.exp(at_once + growth * max(0.0, row.misfit() + math.log(share_from)))
+    at_once, growth = constants
+    return math.exp(at_once + growth * row.shortfall())
 
 
 def inflation_text(constants):
