@@ -26,7 +26,8 @@ struct MethodOptions {
   /// Radius, mm on the isocentre plane, of the discs about fiducials that registration does not
   /// see.
   double fiducial_mask_mm = 4.0;
-  // A portfolio's judge rejects ends at or below the first value; one at or above the second ends it.
+  // A portfolio's judge rejects ends at or below the first value; one at or above the second ends
+  // it.
   std::optional<double> judge_least_value;
   std::optional<double> judge_enough_value;
   std::uint64_t seed = 1;

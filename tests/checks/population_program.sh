@@ -68,7 +68,7 @@ refuse 4 'holds no finished run of clean-2-fast' "${uncertainty[@]}" missing
 refuse 4 'has the same patient, too' "${uncertainty[@]}" pop pop
 refuse 4 'its folder is missing' "${uncertainty[@]}" pop --judge --csv nowhere/uncertainty.csv
 # Damaged tables; patients of even numbers alone, of whom nothing can be fitted.
-for damage in 's/,squared_distance//' '2s/,.*//' '2,$d' 's/^spine-001/spine-002/'; do
+for damage in 's/,squared_distance//' '2s/,.*//' "2,\$d" 's/^spine-001/spine-002/'; do
   rm -rf damaged
   cp -r pop damaged
   sed -i "$damage" damaged/runs/clean-2-fast/spine-001/registrations.csv
