@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "evaluate/statistics/patient_names.h"
 #include "text/csv_table.h"
 
 namespace af::evaluation {

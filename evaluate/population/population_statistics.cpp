@@ -2,7 +2,6 @@
 #include "evaluate/population/population_statistics.h"
 
 #include <algorithm>
-#include <cctype>
 #include <map>
 #include <numeric>
 #include <span>
@@ -10,18 +9,11 @@
 
 #include "base/hash_random.h"
 #include "base/sample_summary.h"
+#include "evaluate/statistics/patient_names.h"
 
 namespace af::evaluation {
 
 namespace {
-
-std::size_t digits_at_end(const std::string& text) {
-  std::size_t count = 0;
-  while (count < text.size() &&
-         std::isdigit(static_cast<unsigned char>(text[text.size() - 1 - count])) != 0)
-    ++count;
-  return count;
-}
 
 const std::vector<TreOutcome>& ends_of(const PatientOutcomes& patient, CountedEnd end) {
   return end == CountedEnd::Tre ? patient.by_tre : patient.by_mrpd;
@@ -171,13 +163,6 @@ int PatientOutcomes::number() const {
 
 std::string PatientOutcomes::kind() const {
   return number() == 0 ? patient : patient.substr(0, patient.size() - digits_at_end(patient) - 1);
-}
-
-std::string patient_of_case(const std::string& case_name) {
-  const std::size_t digits = digits_at_end(case_name);
-  if (digits == 0 || case_name.size() < digits + 3) return case_name;
-  const std::size_t mark = case_name.size() - digits - 2;
-  return case_name.compare(mark, 2, "-p") == 0 ? case_name.substr(0, mark) : case_name;
 }
 
 std::string half_of(const PatientOutcomes& patient) {

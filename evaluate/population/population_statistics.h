@@ -33,9 +33,6 @@ struct PatientOutcomes {
   [[nodiscard]] std::string kind() const;
 };
 
-/// The patient of a case: its name without a trailing "-pN", which says which true pose.
-std::string patient_of_case(const std::string& case_name);
-
 /// "odd" (the half to tune on), "even" (the half to judge on) or "real".
 std::string half_of(const PatientOutcomes& patient);
 

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "evaluate/statistics/patient_names.h"
 #include "geometry/rigid_transform.h"
 #include "gold_standard/target_box.h"
 #include "gold_standard/tre.h"
@@ -192,7 +193,8 @@ std::string pose_distances_markdown(const std::vector<PoseDistanceRow>& rows) {
 std::vector<PatientDistances> distances_over_patients(const std::vector<PoseDistanceRow>& rows,
                                                       double margin_mm) {
   std::vector<PatientDistances> methods;
-  // By case: runs of one name, and both orders of two methods, may have it several times.
+  // By patient: who may have several poses, and each of these several rows, as runs of one name and
+  // both orders of two methods do.
   std::vector<std::map<std::string, std::vector<double>>> means_mm;
   for (const PoseDistanceRow& row : rows) {
     const auto is_same = [&](const PatientDistances& other) {
@@ -206,14 +208,14 @@ std::vector<PatientDistances> distances_over_patients(const std::vector<PoseDist
       method = methods.end() - 1;
     }
     method->starts += row.distance_mm.count;
-    means_mm[static_cast<std::size_t>(method - methods.begin())][row.case_name].push_back(
-        row.distance_mm.mean);
+    means_mm[static_cast<std::size_t>(method - methods.begin())][patient_of_case(row.case_name)]
+        .push_back(row.distance_mm.mean);
   }
   constexpr std::uint64_t kSeed = 1;
   for (std::size_t i = 0; i < methods.size(); ++i) {
-    std::vector<double> of_cases_mm;
-    for (const auto& [name, means] : means_mm[i]) of_cases_mm.push_back(summarize(means).mean);
-    methods[i].equivalence = equivalence_over_cases(of_cases_mm, margin_mm, kSeed);
+    std::vector<double> of_patients_mm;
+    for (const auto& [name, means] : means_mm[i]) of_patients_mm.push_back(summarize(means).mean);
+    methods[i].equivalence = equivalence_over_cases(of_patients_mm, margin_mm, kSeed);
   }
   return methods;
 }

@@ -40,7 +40,8 @@ struct PatientDistances {
   CaseEquivalence equivalence;  ///< of the patients' mean distances
 };
 
-/// In the order of the rows. Every patient counts alike.
+/// In the order of the rows. Every patient counts alike, whatever the number of poses
+/// (patient_of_case()).
 std::vector<PatientDistances> distances_over_patients(const std::vector<PoseDistanceRow>& rows,
                                                       double margin_mm);
 

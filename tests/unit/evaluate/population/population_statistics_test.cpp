@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include "evaluate/statistics/patient_names.h"
+
 namespace af::evaluation {
 namespace {
 

@@ -708,6 +708,24 @@ TEST(PoseDistances, CountAPatientOnceHoweverManyRunsHaveIt) {
   EXPECT_NEAR(found[0].equivalence.mean, 0.025, 1e-12);
 }
 
+TEST(PoseDistances, CountAPatientOnceAtHoweverManyPoses) {
+  std::vector<PoseDistanceRow> rows;
+  for (int patient = 1; patient <= 4; ++patient)
+    for (int pose = 1; pose <= 3; ++pose)
+      rows.push_back({"spine-00" + std::to_string(patient) + "-p" + std::to_string(pose),
+                      "robust",
+                      "field",
+                      "robust",
+                      "raycast",
+                      summarize({0.01 * pose})});
+  const std::vector<PatientDistances> found = distances_over_patients(rows, 0.1);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].starts, 12u);
+  EXPECT_EQ(found[0].equivalence.cases, 4u);
+  EXPECT_NEAR(found[0].equivalence.mean, 0.02, 1e-12);
+  EXPECT_FALSE(found[0].equivalence.has_enough_cases());
+}
+
 TEST(PoseDistances, OfARotationDependOnWhereTheBoxIs) {
   const test::ScratchFolder a;
   const test::ScratchFolder b;
