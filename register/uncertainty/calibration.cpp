@@ -26,7 +26,7 @@ struct InflationRow {
 };
 
 /// By `jobs/uncertainty.py`, on patients of odd numbers: the pose's at f8c8d8f, the TREs' at
-/// 0ee87bba; mi's is an earlier fit to cases of one phantom (docs/uncertainty.md). The last row is
+/// caf419aa; mi's is an earlier fit to cases of one phantom (docs/uncertainty.md). The last row is
 /// for measures that were not fitted: the most cautious of them.
 constexpr std::array kInflation = {
     InflationRow{"rg", {0.09, 2.95}, {-0.10, 1.05}},

@@ -158,8 +158,8 @@ TEST(SolidProjector, FindsSmallBodiesThatAMotionMovesByMoreThanTheirSize) {
     const SolidProjector bodies(phantom_of_bodies({ball}), tissue(), motion);
     const Vector3d direction = (through - source).normalized();
     double inside_mm = 0.0;
-    for (double t = 500.0; t < 700.0; t += kStepMm) {
-      const Vector3d point = source + t * direction;
+    for (int step = 0; step < 20000; ++step) {
+      const Vector3d point = source + (500.0 + kStepMm * step) * direction;
       inside_mm += ball.contains(point + motion.displacement_mm(point)) ? kStepMm : 0.0;
     }
     EXPECT_NEAR(all_mm(bodies, source, through), inside_mm, kToleranceMm) << i;

@@ -664,17 +664,21 @@ TEST(PoseDistances, OfTwoRunsAreThoseOfTheirEndsFromTheSameStarts) {
   EXPECT_THAT(pose_distances_markdown(found), testing::HasSubstr("| 2 | 0.3000, "));
 }
 
+/// Field against `renderer_b`, on one case.
+PoseDistanceRow distances_of(const std::string& case_name,
+                             const std::vector<double>& distances_mm,
+                             const std::string& renderer_b = "raycast") {
+  return {case_name, "a", "field", "b", renderer_b, summarize(distances_mm)};
+}
+
 TEST(PoseDistances, OverPatientsTakeTheirMeansAlike) {
   std::vector<PoseDistanceRow> rows;
   for (int patient = 0; patient < 10; ++patient)
-    rows.push_back({"p" + std::to_string(patient),
-                    "a",
-                    "field",
-                    "b",
-                    "field",
-                    // The first patient has more starts than the others, and no more weight.
-                    summarize(std::vector<double>(patient == 0 ? 50 : 1, 0.01 * patient))});
-  rows.push_back({"p0", "a", "field", "b", "raycast", summarize({0.3})});
+    // The first patient has more starts than the others, and no more weight.
+    rows.push_back(distances_of("p" + std::to_string(patient),
+                                std::vector<double>(patient == 0 ? 50 : 1, 0.01 * patient),
+                                "field"));
+  rows.push_back(distances_of("p0", {0.3}));
   const std::vector<PatientDistances> found = distances_over_patients(rows, 0.1);
   ASSERT_EQ(found.size(), 2u);
   EXPECT_EQ(found[0].starts, 59u);
@@ -696,12 +700,7 @@ TEST(PoseDistances, CountAPatientOnceHoweverManyRunsHaveIt) {
   // Two repeats, whose folders have the same names, give four rows for the pair of methods.
   for (int patient = 0; patient < 6; ++patient)
     for (const double distance_mm : {0.01, 0.02, 0.03, 0.04})
-      rows.push_back({"p" + std::to_string(patient),
-                      "robust",
-                      "field",
-                      "fast",
-                      "field",
-                      summarize({distance_mm})});
+      rows.push_back(distances_of("p" + std::to_string(patient), {distance_mm}));
   const std::vector<PatientDistances> found = distances_over_patients(rows, 0.1);
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].equivalence.cases, 6u);
@@ -712,12 +711,8 @@ TEST(PoseDistances, CountAPatientOnceAtHoweverManyPoses) {
   std::vector<PoseDistanceRow> rows;
   for (int patient = 1; patient <= 4; ++patient)
     for (int pose = 1; pose <= 3; ++pose)
-      rows.push_back({"spine-00" + std::to_string(patient) + "-p" + std::to_string(pose),
-                      "robust",
-                      "field",
-                      "robust",
-                      "raycast",
-                      summarize({0.01 * pose})});
+      rows.push_back(distances_of(
+          "spine-00" + std::to_string(patient) + "-p" + std::to_string(pose), {0.01 * pose}));
   const std::vector<PatientDistances> found = distances_over_patients(rows, 0.1);
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].starts, 12u);
