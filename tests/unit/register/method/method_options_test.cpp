@@ -139,13 +139,13 @@ TEST(MethodOptions, ChainsTakeThePlaceOfThePresets) {
   EXPECT_EQ(method.chains[1].stages[1].level, 1);
 }
 
-TEST(Presets, AVerdictOfNotFoundCallsTheLastResort) {
+TEST(Presets, AnEndThatNoVerdictCallsFoundCallsTheLastResort) {
   const RegistrationOptions robust = preset_options("robust");
   int last_resorts = 0;
   for (const ChainOptions& chain : robust.chains) {
     if (!chain.is_last_resort()) continue;
     ++last_resorts;
-    EXPECT_EQ(chain.only_below, kLeastCoarseMean);
+    EXPECT_EQ(chain.only_below, kLeastCoarseOfFound);
   }
   EXPECT_EQ(last_resorts, 1);
 }
