@@ -22,8 +22,8 @@ LEAST_SHARE = 0.05
 
 
 # What is read of a table of registrations.
-COLUMNS = ["case", "tre_mm", "judge_fine_mean", "judge_fine_background", "covariance_inflation", "tre_inflation",
-           "squared_distance", "predicted_tre_rms_mm", "predicted_tre_95_mm", "confidence"]
+COLUMNS = ["case", "tre_mm", "judge_fine_mean", "judge_fine_lowest_view", "judge_fine_background", "covariance_inflation",
+           "tre_inflation", "squared_distance", "predicted_tre_rms_mm", "predicted_tre_95_mm", "confidence"]
 
 
 class Row:
@@ -42,6 +42,7 @@ class Row:
         self.tre = number("tre_mm")
         self.is_success = self.tre < SUCCESS_TRE_MM
         self.fine_mean = number("judge_fine_mean")
+        self.fine_lowest = number("judge_fine_lowest_view")
         self.background = number("judge_fine_background")
         inflation = number("covariance_inflation")
         self.distance = number("squared_distance") * inflation  # by the sandwich alone
@@ -61,10 +62,15 @@ class Row:
         """By how much the logarithm of the share that the pose explains falls short of that of EXPLAINED_SHARE."""
         return max(0.0, math.log(EXPLAINED_SHARE / min(max(self.fine_mean, LEAST_SHARE), 1.0)))
 
+    def excess(self):
+        """Geometric mean over the two views of what each explains beyond chance."""
+        highest = 2.0 * self.fine_mean - self.fine_lowest
+        return math.sqrt(max(0.0, self.fine_lowest - self.background) * max(0.0, highest - self.background))
+
     def features(self):
         """The distance of a portfolio's ends is none of them: where no portfolio fails it would stand for success."""
         tre = FAR_MM if math.isnan(self.tre_rms) else min(max(self.tre_rms, NEAR_MM), FAR_MM)
-        return [1.0, self.fine_mean - self.background, math.log(tre)]
+        return [1.0, self.excess(), math.log(tre)]
 
 
 def weighted_quantile(values, weights, share):

@@ -35,16 +35,31 @@ constexpr std::array kInflation = {
     InflationRow{"", {2.50, 8.00}, {2.50, 8.00}},
 };
 
-/// Of success_confidence(), likewise fitted.
-constexpr double kConfidenceAtOnce = -3.64;
-constexpr double kConfidenceByExcess = 50.09;
-constexpr double kConfidenceByTre = -0.82;
+/// Of success_confidence(), likewise, to the registrations of caf419aa.
+constexpr double kConfidenceAtOnce = -2.73;
+constexpr double kConfidenceByExcess = 44.70;
+constexpr double kConfidenceByTre = -0.90;
 
 /// Smaller shares are treated as this one.
 constexpr double kLeastShare = 0.05;
 /// Predicted TREs are clamped to this range; a missing one counts as the farthest.
 constexpr double kNearMm = 0.001;
 constexpr double kFarMm = 20.0;
+
+/// By how much what a pose explains in detail exceeds what poses beside it do: the geometric mean
+/// over the views that can be judged, because a right pose explains them all. NaN where none can.
+double explained_excess(std::span<const ViewValue> view_values) {
+  const double background = mean_background(view_values);
+  if (!std::isfinite(background)) return background;
+  double product = 1.0;
+  int count = 0;
+  for (const ViewValue& value : view_values) {
+    if (!std::isfinite(value.fine)) continue;
+    product *= std::max(0.0, value.fine - background);
+    ++count;
+  }
+  return std::pow(product, 1.0 / count);
+}
 
 double factor_of(const Inflation& inflation, double share) {
   if (!std::isfinite(share)) return share;
@@ -65,13 +80,12 @@ CovarianceInflation covariance_inflation(const std::string& similarity,
 }
 
 double success_confidence(const ConfidenceFeatures& features) {
-  const double excess = summary_of(features.view_values, &ViewValue::fine).mean -
-                        mean_background(features.view_values);
   const double tre_mm = std::isfinite(features.sandwich_tre_mm)
                             ? std::clamp(features.sandwich_tre_mm, kNearMm, kFarMm)
                             : kFarMm;
-  const double logit =
-      kConfidenceAtOnce + kConfidenceByExcess * excess + kConfidenceByTre * std::log(tre_mm);
+  const double logit = kConfidenceAtOnce +
+                       kConfidenceByExcess * explained_excess(features.view_values) +
+                       kConfidenceByTre * std::log(tre_mm);
   return 1.0 / (1.0 + std::exp(-logit));
 }
 

@@ -30,9 +30,10 @@ struct ConfidenceFeatures {
 };
 
 /// Probability that the TRE is below 2.5 mm, by logistic regression on how much more of the X-rays'
-/// gradients the pose explains than poses beside it, and on the logarithm of the predicted TRE. NaN
-/// where no view can be judged, or no pose beside it.
+/// gradients the pose explains than poses beside it (geometric mean over the views), and on the
+/// logarithm of the predicted TRE. NaN where no view can be judged, or no pose beside it.
 /// \test Calibration.ConfidenceFallsWithEveryDoubt
+/// \test Calibration.AViewThatShowsNothingLeavesNoConfidence
 double success_confidence(const ConfidenceFeatures& features);
 
 }  // namespace af::registration

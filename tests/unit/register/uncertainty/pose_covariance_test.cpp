@@ -198,5 +198,23 @@ TEST(Calibration, ConfidenceFallsWithEveryDoubt) {
   EXPECT_TRUE(std::isnan(success_confidence({{}, 0.1})));
 }
 
+// A wrong vertebra: one view fits, the other shows no more than chance would.
+TEST(Calibration, AViewThatShowsNothingLeavesNoConfidence) {
+  const auto confidence = [](double fine_a, double fine_b) {
+    const std::vector<ViewValue> values = {{0.5, fine_a, false, 0.04}, {0.5, fine_b, false, 0.04}};
+    return success_confidence({values, 1.0});
+  };
+  EXPECT_LT(confidence(0.6, 0.04), 0.1);
+  EXPECT_EQ(confidence(0.6, 0.04), confidence(0.04, 0.6));
+  EXPECT_EQ(confidence(0.6, 0.02), confidence(0.6, 0.04));  // nor does less than chance
+  EXPECT_GT(confidence(0.32, 0.32), 0.99);                  // of the same mean
+
+  // A view that cannot be judged neither helps nor hinders.
+  const ViewValue seen = {0.5, 0.2, false, 0.04};
+  const ViewValue unseen = {0.5, std::nan(""), false, 0.04};
+  EXPECT_EQ(success_confidence({std::vector{seen, unseen}, 1.0}),
+            success_confidence({std::vector{seen}, 1.0}));
+}
+
 }  // namespace
 }  // namespace af::registration
