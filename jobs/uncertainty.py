@@ -17,13 +17,13 @@ import sys
 MEASURE_OF = {"robust": "rg", "fast": "gc", "paper": "mi"}
 REGION_95 = 12.591587243743977  # chi-square, six degrees of freedom
 SUCCESS_TRE_MM = 2.5
-NEAR_MM, FAR_MM = 0.001, 20.0
+NEAR_MM, FAR_MM = 0.1, 20.0
 LEAST_SHARE = 0.05
 
 
 # What is read of a table of registrations.
-COLUMNS = ["case", "tre_mm", "judge_fine_mean", "judge_fine_lowest_view", "judge_fine_background", "covariance_inflation",
-           "tre_inflation", "squared_distance", "predicted_tre_rms_mm", "predicted_tre_95_mm", "confidence"]
+COLUMNS = ["case", "tre_mm", "judge_fine_mean", "judge_excess", "covariance_inflation", "tre_inflation", "squared_distance",
+           "predicted_tre_rms_mm", "predicted_tre_95_mm", "confidence"]
 
 
 class Row:
@@ -42,8 +42,7 @@ class Row:
         self.tre = number("tre_mm")
         self.is_success = self.tre < SUCCESS_TRE_MM
         self.fine_mean = number("judge_fine_mean")
-        self.fine_lowest = number("judge_fine_lowest_view")
-        self.background = number("judge_fine_background")
+        self.excess = number("judge_excess")
         inflation = number("covariance_inflation")
         self.distance = number("squared_distance") * inflation  # by the sandwich alone
         tre_inflation = number("tre_inflation")
@@ -51,7 +50,7 @@ class Row:
         self.tre_rms = number("predicted_tre_rms_mm") * scale
         self.tre_95 = number("predicted_tre_95_mm") * scale
         self.has_pose = not math.isnan(self.fine_mean)
-        self.has_confidence = self.has_pose and not math.isnan(self.background)
+        self.has_confidence = self.has_pose and not math.isnan(self.excess)
         self.stated_inflation = inflation
         self.stated_tre_inflation = tre_inflation
         self.stated_confidence = number("confidence")
@@ -62,15 +61,10 @@ class Row:
         """By how much the logarithm of the share that the pose explains falls short of that of EXPLAINED_SHARE."""
         return max(0.0, math.log(EXPLAINED_SHARE / min(max(self.fine_mean, LEAST_SHARE), 1.0)))
 
-    def excess(self):
-        """Geometric mean over the two views of what each explains beyond chance."""
-        highest = 2.0 * self.fine_mean - self.fine_lowest
-        return math.sqrt(max(0.0, self.fine_lowest - self.background) * max(0.0, highest - self.background))
-
     def features(self):
         """The distance of a portfolio's ends is none of them: where no portfolio fails it would stand for success."""
         tre = FAR_MM if math.isnan(self.tre_rms) else min(max(self.tre_rms, NEAR_MM), FAR_MM)
-        return [1.0, self.excess(), math.log(tre)]
+        return [1.0, self.excess, math.log(tre)]
 
 
 def weighted_quantile(values, weights, share):

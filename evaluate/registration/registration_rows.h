@@ -62,6 +62,7 @@ struct RegistrationRow {
   registration::ViewSummary judge = {kMissing, kMissing};
   registration::ViewSummary judge_fine = {kMissing, kMissing};
   double judge_background = kMissing;  ///< mean over the views
+  double judge_excess = kMissing;      ///< registration::explained_excess()
   registration::UncertaintyReport uncertainty;
   double chain_distance_mm = kMissing;
   double squared_distance = kMissing;  ///< Mahalanobis, of the error by the covariance
@@ -93,6 +94,7 @@ struct RegistrationRow {
                     judge,
                     judge_fine,
                     judge_background,
+                    judge_excess,
                     uncertainty,
                     chain_distance_mm,
                     squared_distance,

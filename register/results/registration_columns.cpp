@@ -57,12 +57,16 @@ NamedCells correction_cells(const std::optional<CorrectionReport>& correction) {
   return cells;
 }
 
-NamedCells judge_cells(const ViewSummary& coarse, const ViewSummary& fine, double background) {
+NamedCells judge_cells(const ViewSummary& coarse,
+                       const ViewSummary& fine,
+                       double background,
+                       double excess) {
   return {{"judge_mean", number_text(coarse.mean)},
           {"judge_lowest_view", number_text(coarse.lowest)},
           {"judge_fine_mean", number_text(fine.mean)},
           {"judge_fine_lowest_view", number_text(fine.lowest)},
-          {"judge_fine_background", number_text(background)}};
+          {"judge_fine_background", number_text(background)},
+          {"judge_excess", number_text(excess)}};
 }
 
 NamedCells uncertainty_cells(const UncertaintyReport& report, double chain_distance_mm) {

@@ -36,30 +36,16 @@ constexpr std::array kInflation = {
 };
 
 /// Of success_confidence(), likewise, to the registrations of caf419aa.
-constexpr double kConfidenceAtOnce = -2.73;
-constexpr double kConfidenceByExcess = 44.70;
-constexpr double kConfidenceByTre = -0.90;
+constexpr double kConfidenceAtOnce = -2.46;
+constexpr double kConfidenceByExcess = 44.41;
+constexpr double kConfidenceByTre = -0.88;
 
 /// Smaller shares are treated as this one.
 constexpr double kLeastShare = 0.05;
-/// Predicted TREs are clamped to this range; a missing one counts as the farthest.
-constexpr double kNearMm = 0.001;
+/// Predicted TREs are clamped to this range, so that a small one does not stand for what X-rays do
+/// not show; a missing one counts as the farthest.
+constexpr double kNearMm = 0.1;
 constexpr double kFarMm = 20.0;
-
-/// By how much what a pose explains in detail exceeds what poses beside it do: the geometric mean
-/// over the views that can be judged, because a right pose explains them all. NaN where none can.
-double explained_excess(std::span<const ViewValue> view_values) {
-  const double background = mean_background(view_values);
-  if (!std::isfinite(background)) return background;
-  double product = 1.0;
-  int count = 0;
-  for (const ViewValue& value : view_values) {
-    if (!std::isfinite(value.fine)) continue;
-    product *= std::max(0.0, value.fine - background);
-    ++count;
-  }
-  return std::pow(product, 1.0 / count);
-}
 
 double factor_of(const Inflation& inflation, double share) {
   if (!std::isfinite(share)) return share;

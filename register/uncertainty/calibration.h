@@ -29,11 +29,10 @@ struct ConfidenceFeatures {
   double sandwich_tre_mm = 0.0;  ///< as predicted, before inflation; NaN counts as no prediction
 };
 
-/// Probability that the TRE is below 2.5 mm, by logistic regression on how much more of the X-rays'
-/// gradients the pose explains than poses beside it (geometric mean over the views), and on the
-/// logarithm of the predicted TRE. NaN where no view can be judged, or no pose beside it.
-/// \test Calibration.ConfidenceFallsWithEveryDoubt
-/// \test Calibration.AViewThatShowsNothingLeavesNoConfidence
+/// Probability that the TRE is below 2.5 mm, by logistic regression on explained_excess() and on
+/// the logarithm of the predicted TRE. NaN where there is no excess. \test
+/// Calibration.ConfidenceFallsWithEveryDoubt \test
+/// Calibration.AViewThatShowsNothingLeavesLittleConfidence
 double success_confidence(const ConfidenceFeatures& features);
 
 }  // namespace af::registration

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -138,6 +139,19 @@ double mean_background(std::span<const ViewValue> values) {
   for (const ViewValue& value : values)
     if (std::isfinite(value.fine)) backgrounds.push_back(value.background);
   return mean_of(backgrounds);
+}
+
+double explained_excess(std::span<const ViewValue> values) {
+  double sum_of_inverses = 0.0;
+  int count = 0;
+  for (const ViewValue& value : values) {
+    if (!std::isfinite(value.fine)) continue;
+    const double excess = value.fine - value.background;
+    if (!std::isfinite(excess)) return std::nan("");
+    sum_of_inverses += excess > 0.0 ? 1.0 / excess : std::numeric_limits<double>::infinity();
+    ++count;
+  }
+  return count > 0 ? count / sum_of_inverses : std::nan("");
 }
 
 ViewSummary summary_of(std::span<const ViewValue> values, double ViewValue::*value) {

@@ -90,4 +90,11 @@ ViewSummary summary_of(std::span<const ViewValue> values, double ViewValue::*val
 /// \test PoseExaminer.MeanBackgroundIsOfTheViewsThatAreJudged
 double mean_background(std::span<const ViewValue> values);
 
+/// By how much more the pose explains in detail than poses beside it: the harmonic mean over the
+/// views that can be judged, of `fine` less `background`. A right pose explains every view, so it
+/// is 0 when a view has no more than its background. NaN when a judged view has none, or no view
+/// can be judged.
+/// \test PoseExaminer.AViewThatShowsNothingLeavesNoExcess
+double explained_excess(std::span<const ViewValue> values);
+
 }  // namespace af::registration

@@ -63,6 +63,26 @@ uncertainty=(prefix/libexec/attenuation-fields/jobs/uncertainty.py --presets fas
 # gc, all, and all of clean X-rays.
 [[ $(wc -l <uncertainty.csv) == 4 ]] || fail "uncertainty.py wrote $(cat uncertainty.csv)"
 grep -q '^gc,"all, as stated",' uncertainty.csv || fail "uncertainty.py wrote $(cat uncertainty.csv)"
+# Fields are too coarse for a success, which a fit needs: here is one. What the programs state is what the script would
+# by their constants.
+cp -r pop right
+awk -F, -v OFS=, 'NR == 1 { for (i = 1; i <= NF; ++i) if ($i == "tre_mm") tre = i } NR == 2 { $tre = 0.5 } 1' \
+  pop/runs/clean-2-fast/spine-001/registrations.csv >right/runs/clean-2-fast/spine-001/registrations.csv
+"${uncertainty[@]}" right >fitted 2>err || fail "uncertainty.py: $(cat err)"
+grep -q '^constexpr double kConfidenceByExcess = ' fitted || fail "uncertainty.py fitted $(cat fitted)"
+python3 - "$root/register/uncertainty/calibration.cpp" pop/runs/clean-2-fast/spine-001/registrations.csv <<'PYTHON' || fail "uncertainty.py differs from calibration.cpp"
+import csv, re, sys
+sys.path.insert(0, "prefix/libexec/attenuation-fields/jobs")
+import uncertainty
+text = open(sys.argv[1], encoding="utf-8").read()
+constants = [float(re.search(f"kConfidence{name} = ([-0-9.]+);", text)[1]) for name in ("AtOnce", "ByExcess", "ByTre")]
+rows = [uncertainty.Row("gc", "clean", cells) for cells in csv.DictReader(open(sys.argv[2], encoding="utf-8"))]
+stated = [row for row in rows if row.has_confidence and row.stated_confidence != 0.0]
+assert stated, "no row states a confidence"
+for row in stated:
+    expected = uncertainty.probability(constants, row.features())
+    assert abs(row.stated_confidence - expected) < 1e-9, (row.case, row.stated_confidence, expected)
+PYTHON
 refuse 2 "must be some of robust, fast, paper" "${uncertainty[@]}" --presets bone pop
 refuse 4 'holds no finished run of clean-2-fast' "${uncertainty[@]}" missing
 refuse 4 'has the same patient, too' "${uncertainty[@]}" pop pop

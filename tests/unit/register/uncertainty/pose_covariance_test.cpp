@@ -185,35 +185,34 @@ TEST(Calibration, ConfidenceFallsWithEveryDoubt) {
     return success_confidence({std::vector<ViewValue>{value, value}, tre_mm});
   };
   const double none = std::nan("");
-  const double best = confidence(0.5, 0.3, 0.1);
+  const double best = confidence(0.5, 0.3, 0.2);
   EXPECT_GT(best, 0.9);
   EXPECT_LE(best, 1.0);
-  EXPECT_LT(confidence(0.4, 0.3, 0.1), best);
-  EXPECT_LT(confidence(0.5, 0.4, 0.1), best);
+  EXPECT_LT(confidence(0.4, 0.3, 0.2), best);
+  EXPECT_LT(confidence(0.5, 0.4, 0.2), best);
   EXPECT_LT(confidence(0.5, 0.3, 8.0), best);
   EXPECT_LT(confidence(0.5, 0.3, none), best);
   EXPECT_EQ(confidence(0.5, 0.3, none), confidence(0.5, 0.3, 1e6));
-  EXPECT_GT(confidence(0.5, 0.3, 0.0), best);
+  EXPECT_GT(confidence(0.5, 0.3, 0.1), best);
+  EXPECT_EQ(confidence(0.5, 0.3, 0.0), confidence(0.5, 0.3, 0.1));
   EXPECT_TRUE(std::isnan(confidence(0.5, none, 0.1)));
   EXPECT_TRUE(std::isnan(success_confidence({{}, 0.1})));
 }
 
-// A wrong vertebra: one view fits, the other shows no more than chance would.
-TEST(Calibration, AViewThatShowsNothingLeavesNoConfidence) {
-  const auto confidence = [](double fine_a, double fine_b) {
-    const std::vector<ViewValue> values = {{0.5, fine_a, false, 0.04}, {0.5, fine_b, false, 0.04}};
-    return success_confidence({values, 1.0});
+// A wrong vertebra: one view fits, the other shows hardly more than chance would. No predicted TRE
+// makes up for it.
+TEST(Calibration, AViewThatShowsNothingLeavesLittleConfidence) {
+  const auto confidence = [](double fine_a, double fine_b, double tre_mm) {
+    const std::vector<ViewValue> values = {{0.5, fine_a, false, 0.06}, {0.5, fine_b, false, 0.02}};
+    return success_confidence({values, tre_mm});
   };
-  EXPECT_LT(confidence(0.6, 0.04), 0.1);
-  EXPECT_EQ(confidence(0.6, 0.04), confidence(0.04, 0.6));
-  EXPECT_EQ(confidence(0.6, 0.02), confidence(0.6, 0.04));  // nor does less than chance
-  EXPECT_GT(confidence(0.32, 0.32), 0.99);                  // of the same mean
-
-  // A view that cannot be judged neither helps nor hinders.
-  const ViewValue seen = {0.5, 0.2, false, 0.04};
-  const ViewValue unseen = {0.5, std::nan(""), false, 0.04};
-  EXPECT_EQ(success_confidence({std::vector{seen, unseen}, 1.0}),
-            success_confidence({std::vector{seen}, 1.0}));
+  for (const double tre_mm : {1e-6, 0.05, 0.1, 0.3, 1.0}) {
+    EXPECT_LT(confidence(0.60, 0.02, tre_mm), 0.5);
+    EXPECT_LT(confidence(0.60, 0.04, tre_mm), 0.9);
+    EXPECT_LT(confidence(0.06, 0.58, tre_mm), 0.5);
+    EXPECT_GT(confidence(0.32, 0.30, tre_mm), 0.99);  // of the same mean
+  }
+  EXPECT_LT(confidence(0.60, 0.04, 1.0), 0.5);
 }
 
 }  // namespace

@@ -128,6 +128,21 @@ TEST(PoseExaminer, MeanBackgroundIsOfTheViewsThatAreJudged) {
   EXPECT_TRUE(std::isnan(mean_background({})));
 }
 
+TEST(PoseExaminer, AViewThatShowsNothingLeavesNoExcess) {
+  const double none = std::nan("");
+  const auto excess = [](std::vector<ViewValue> values) { return explained_excess(values); };
+  const ViewValue more = {0.5, 0.4, false, 0.1};
+  const ViewValue less = {0.5, 0.3, false, 0.2};
+  EXPECT_DOUBLE_EQ(excess({more}), 0.3);
+  EXPECT_DOUBLE_EQ(excess({more, less}), 2.0 / (1.0 / 0.3 + 1.0 / 0.1));
+  EXPECT_DOUBLE_EQ(excess({less, more}), excess({more, less}));
+  EXPECT_EQ(excess({more, {0.5, 0.2, false, 0.2}}), 0.0);  // as much as beside it
+  EXPECT_EQ(excess({more, {0.5, 0.1, false, 0.2}}), 0.0);
+  EXPECT_DOUBLE_EQ(excess({more, {none, none}}), 0.3);  // cannot be judged: does not count
+  EXPECT_TRUE(std::isnan(excess({more, {0.5, 0.4, false, none}})));
+  EXPECT_TRUE(std::isnan(excess({})));
+}
+
 TEST(PoseExaminer, BackgroundIsTakenNearerWhereAFieldEnds) {
   const auto background_within = [](double reach_mm) {
     test::SmallCase small = case_with_levels();
