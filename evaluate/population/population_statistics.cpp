@@ -192,8 +192,13 @@ PopulationSuccess population_success(const std::vector<const PatientOutcomes*>& 
         capture_interval(own.back(), hash64(counting.seed, hash_name(patient->patient)), rates);
     result.starts += success.starts;
     result.successes += success.successes;
+    result.patients_with_failures += success.successes < success.starts ? 1 : 0;
     result.patients.push_back(std::move(success));
   }
+  for (const double threshold_mm : kLadderMm)
+    result.below_ladder.push_back(count_successes(all, threshold_mm));
+  result.share_with_failures = wilson_interval(result.patients_with_failures,
+                                               static_cast<std::int64_t>(result.patients.size()));
   result.rate = rate_over(result.patients, counting);
   result.capture_mm = capture_over(result.patients, counting);
   result.intervals = intervals_of(all, counting);

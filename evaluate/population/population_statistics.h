@@ -61,6 +61,11 @@ struct PopulationSuccess {
   std::vector<PatientSuccess> patients;
   std::int64_t starts = 0;
   std::int64_t successes = 0;
+  std::vector<std::int64_t> below_ladder;  ///< ends below each threshold of kLadderMm
+  /// How many lost a start. Of a rate near 1 it says more than the rate's intervals, which are too
+  /// narrow where few patients lose many.
+  std::int64_t patients_with_failures = 0;
+  ProportionInterval share_with_failures;  ///< Wilson's, of such patients
   OverPatients rate;                 ///< of all starts; every patient has its own number of them
   OverPatients capture_mm;           ///< mean of the patients' own capture ranges
   CaptureRange pooled;               ///< of all starts together

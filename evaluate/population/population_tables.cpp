@@ -36,7 +36,7 @@ PopulationGroup group_of(const PopulationCondition& condition,
 }
 
 struct NamedCell {
-  const char* name;
+  std::string name;
   std::string text;
 };
 
@@ -52,22 +52,31 @@ std::vector<NamedCell> success_of(const PopulationSuccess& success) {
   const auto number = [](double value) { return number_text(value); };
   const auto& rate = success.rate;
   const auto& own = success.capture_mm;
-  return {{"successes", std::to_string(success.successes)},
-          {"rate", number(rate.value)},
-          {"student_low", number(rate.student.low)},
-          {"student_high", number(rate.student.high)},
-          {"bootstrap_low", number(rate.bootstrap.low)},
-          {"bootstrap_high", number(rate.bootstrap.high)},
-          {"worst_patient_rate", number(worst)},
-          {"capture_mm", number(success.pooled.initial_tre_mm)},
-          {"capture_bootstrap_low_mm", number(success.pooled_interval_mm.low)},
-          {"capture_bootstrap_high_mm", number(success.pooled_interval_mm.high)},
-          {"patients_capture_mean_mm", number(own.value)},
-          {"patients_capture_student_low_mm", number(own.student.low)},
-          {"patients_capture_student_high_mm", number(own.student.high)},
-          {"patients_capture_bootstrap_low_mm", number(own.bootstrap.low)},
-          {"patients_capture_bootstrap_high_mm", number(own.bootstrap.high)},
-          {"patients_capture_smallest_mm", number(smallest_mm)}};
+  std::vector<NamedCell> cells = {
+      {"successes", std::to_string(success.successes)},
+      {"rate", number(rate.value)},
+      {"student_low", number(rate.student.low)},
+      {"student_high", number(rate.student.high)},
+      {"bootstrap_low", number(rate.bootstrap.low)},
+      {"bootstrap_high", number(rate.bootstrap.high)},
+      {"worst_patient_rate", number(worst)},
+      {"capture_mm", number(success.pooled.initial_tre_mm)},
+      {"capture_bootstrap_low_mm", number(success.pooled_interval_mm.low)},
+      {"capture_bootstrap_high_mm", number(success.pooled_interval_mm.high)},
+      {"patients_capture_mean_mm", number(own.value)},
+      {"patients_capture_student_low_mm", number(own.student.low)},
+      {"patients_capture_student_high_mm", number(own.student.high)},
+      {"patients_capture_bootstrap_low_mm", number(own.bootstrap.low)},
+      {"patients_capture_bootstrap_high_mm", number(own.bootstrap.high)},
+      {"patients_capture_smallest_mm", number(smallest_mm)},
+      {"patients_with_failures", std::to_string(success.patients_with_failures)},
+      {"share_with_failures_low", number(success.share_with_failures.low)},
+      {"share_with_failures_high", number(success.share_with_failures.high)}};
+  for (std::size_t i = 0; i < kLadderMm.size(); ++i)
+    cells.push_back(
+        {"below_" + number_text(kLadderMm[i]) + "_mm",
+         i < success.below_ladder.size() ? std::to_string(success.below_ladder[i]) : ""});
+  return cells;
 }
 
 std::string percent(double share) {
@@ -78,11 +87,24 @@ std::string millimetre_text(double value) {
   return std::isfinite(value) ? fixed_text(value, 1) : "-";
 }
 
+std::string patient_cells(const PopulationSuccess& success) {
+  return std::to_string(success.patients.size()) + ", " +
+         std::to_string(success.patients_with_failures) + " | " + std::to_string(success.starts);
+}
+
+/// The share of ends below a threshold of the ladder.
+std::string below_text(const PopulationSuccess& success, double threshold_mm) {
+  const auto found = std::find(kLadderMm.begin(), kLadderMm.end(), threshold_mm);
+  const auto count = static_cast<double>(
+      success.below_ladder.at(static_cast<std::size_t>(found - kLadderMm.begin())));
+  return percent(count / static_cast<double>(success.starts));
+}
+
 std::string success_cells(const PopulationSuccess& success) {
   return percent(success.rate.value) + " | " + percent(success.rate.bootstrap.low) + " to " +
          percent(success.rate.bootstrap.high) + " | " + percent(success.rate.student.low) + " to " +
-         percent(success.rate.student.high) + " | " +
-         (success.pooled.is_whole_study() ? ">= " : "") +
+         percent(success.rate.student.high) + " | " + below_text(success, 1.0) + " / " +
+         below_text(success, 5.0) + " | " + (success.pooled.is_whole_study() ? ">= " : "") +
          millimetre_text(success.pooled.initial_tre_mm) + " | " +
          millimetre_text(success.capture_mm.value) + " (" +
          millimetre_text(success.capture_mm.bootstrap.low) + " to " +
@@ -97,14 +119,14 @@ bool is_kind(const PopulationGroup& group) {
 /// All patients, and the halves.
 std::string population_markdown(const std::vector<PopulationGroup>& groups, bool by_mrpd) {
   std::string text =
-      "| Condition | Group | Patients | Starts | Success, % | Bootstrap | Student's | "
+      "| Condition | Group | Patients, of whom lost a start | Starts | Success, % | Bootstrap | "
+      "Student's | Below 1 / 5 mm, % | "
       "Capture range of all, mm | Patients' own, mean, mm | Median TRE, mm | Seconds |\n"
-      "|---|---|---|---|---|---|---|---|---|---|---|\n";
+      "|---|---|---|---|---|---|---|---|---|---|---|---|\n";
   for (const PopulationGroup& group : groups)
     if (!is_kind(group))
       text += "| " + group.condition + " | " + group.group + " | " +
-              std::to_string(group.by_tre.patients.size()) + " | " +
-              std::to_string(group.by_tre.starts) + " | " +
+              patient_cells(by_mrpd ? group.by_mrpd : group.by_tre) + " | " +
               success_cells(by_mrpd ? group.by_mrpd : group.by_tre) + " | " +
               (std::isfinite(group.median_tre_mm) ? fixed_text(group.median_tre_mm, 2) : "-") +
               " | " + fixed_text(group.median_seconds, 3) + " |\n";
@@ -173,7 +195,7 @@ CsvTable population_table(const std::vector<PopulationGroup>& groups) {
   std::vector<std::string> columns{
       "condition", "group", "patients", "starts", "median_tre_mm", "median_seconds"};
   for (const char* const error : {"tre_", "mrpd_"})
-    for (const NamedCell& cell : success_of({})) columns.push_back(error + std::string(cell.name));
+    for (const NamedCell& cell : success_of({})) columns.push_back(error + cell.name);
   CsvTable table(columns);
   for (const PopulationGroup& group : groups) {
     std::vector<std::string> fields{group.condition,

@@ -2,7 +2,6 @@
 #include "evaluate/registration/success_statistics.h"
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -20,9 +19,6 @@ namespace af::evaluation {
 using nlohmann::json;
 
 namespace {
-
-/// Of TRE and of mRPD alike.
-constexpr std::array<double, 5> kThresholdsMm = {1.0, 2.0, 2.5, 5.0, 10.0};
 
 /// The ends are TREs, or mRPDs: with one view the depth along its rays stays unknown, so that a TRE
 /// says little, while a distance from the rays can be small.
@@ -46,7 +42,7 @@ json share_below(double threshold_mm, const std::vector<TreOutcome>& outcomes) {
 
 json ladder_json(const std::vector<TreOutcome>& outcomes) {
   json ladder = json::array();
-  for (const double threshold : kThresholdsMm) ladder.push_back(share_below(threshold, outcomes));
+  for (const double threshold : kLadderMm) ladder.push_back(share_below(threshold, outcomes));
   return ladder;
 }
 

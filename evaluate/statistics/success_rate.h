@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -11,6 +12,9 @@ namespace af::evaluation {
 
 /// The paper's: TRE below this is a success (Sec. IV-B).
 inline constexpr double kSuccessTreMm = 2.5;
+
+/// Below which ends are counted, mm: of TRE and of mRPD alike.
+inline constexpr std::array<double, 5> kLadderMm = {1.0, 2.0, 2.5, 5.0, 10.0};
 
 /// The share of starts that must succeed inside a capture range.
 inline constexpr double kCaptureShare = 0.95;

@@ -39,6 +39,15 @@ TEST(PopulationTables, CountAllPatientsTheHalvesAndTheKinds) {
   EXPECT_EQ(table.number(0, "tre_successes"), 10.0);
   EXPECT_EQ(table.number(0, "mrpd_successes"), 12.0);
   EXPECT_EQ(table.number(0, "tre_worst_patient_rate"), 0.5);
+  EXPECT_EQ(table.number(0, "tre_patients_with_failures"), 1.0);
+  EXPECT_EQ(table.number(0, "mrpd_patients_with_failures"), 0.0);
+  // Wilson (1927) for 1 of 3.
+  EXPECT_NEAR(table.number(0, "tre_share_with_failures_low"), 0.0615, 5e-5);
+  EXPECT_NEAR(table.number(0, "tre_share_with_failures_high"), 0.7923, 5e-5);
+  EXPECT_EQ(table.number(0, "tre_below_1_mm"), 10.0);
+  EXPECT_EQ(table.number(0, "tre_below_5_mm"), 10.0);
+  EXPECT_EQ(table.number(0, "tre_below_10_mm"), 12.0);
+  EXPECT_NE(population_text(groups, kTwoIntervals).find("| 3, 1 | 12 | 83.3 |"), std::string::npos);
   EXPECT_EQ(table.text(1, "group"), "odd");
   EXPECT_EQ(table.number(1, "tre_successes"), 6.0);
   EXPECT_EQ(table.text(2, "group"), "even");
