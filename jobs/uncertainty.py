@@ -57,6 +57,10 @@ class Row:
         self.inflation = self.tre_inflation = 1.0
         self.confidence = 0.0
 
+    def kind(self):
+        """Of patient: the name without its number."""
+        return re.sub(r"-\d+$", "", self.patient)
+
     def shortfall(self):
         """By how much the logarithm of the share that the pose explains falls short of that of EXPLAINED_SHARE."""
         return max(0.0, math.log(EXPLAINED_SHARE / min(max(self.fine_mean, LEAST_SHARE), 1.0)))
@@ -157,11 +161,41 @@ def fit_confidence(rows, ridge=0.05):
     return coefficients
 
 
-def roc_area(positives, negatives):
-    if not positives or not negatives:
-        return math.nan
-    wins = sum((p > q) + 0.5 * (p == q) for p in positives for q in negatives)
-    return wins / (len(positives) * len(negatives))
+def roc_area(groups, times=None):
+    """Area under the ROC curve. `groups`: of rising confidence, the patients of successes and of failures that share it;
+    `times`: how often each patient counts."""
+
+    def count(patients):
+        return len(patients) if times is None else sum(times[patient] for patient in patients)
+
+    wins = successes = failures = 0.0
+    for of_successes, of_failures in groups:
+        won, lost = count(of_successes), count(of_failures)
+        wins += won * (failures + 0.5 * lost)
+        successes += won
+        failures += lost
+    return wins / (successes * failures) if successes and failures else math.nan
+
+
+def roc_interval(rows):
+    """roc_area() and its 95 % interval by percentile bootstrap over patients; draws without failures or successes do not
+    count."""
+    by_confidence = {}
+    for row in rows:
+        by_confidence.setdefault(row.confidence, ([], []))[0 if row.is_success else 1].append(row.patient)
+    groups = [by_confidence[confidence] for confidence in sorted(by_confidence)]
+    patients = sorted({row.patient for row in rows})
+    generator = random.Random(1)
+    areas = []
+    for _ in range(400 if len(patients) > 1 else 0):
+        times = dict.fromkeys(patients, 0)
+        for patient in generator.choices(patients, k=len(patients)):
+            times[patient] += 1
+        areas.append(roc_area(groups, times))
+    areas = [area for area in areas if not math.isnan(area)]
+    alike = [1.0] * len(areas)
+    low, high = [weighted_quantile(areas, alike, share) if areas else math.nan for share in (0.025, 0.975)]
+    return roc_area(groups), low, high
 
 
 def share(values):
@@ -194,8 +228,9 @@ def coverage_interval(rows, holds, draws=2000):
 
 def summary(label, half, rows):
     known = [row for row in rows if row.is_success and not math.isnan(row.distance)]
-    successes = [row.confidence for row in rows if row.has_confidence and row.is_success]
-    failures = [row.confidence for row in rows if row.has_confidence and not row.is_success]
+    confident = [row for row in rows if row.has_confidence]
+    successes = [row.confidence for row in confident if row.is_success]
+    failures = [row.confidence for row in confident if not row.is_success]
 
     def in_region(row):
         return row.distance <= REGION_95 * row.inflation
@@ -205,6 +240,7 @@ def summary(label, half, rows):
 
     region_low, region_high = coverage_interval(known, in_region)
     tre_low, tre_high = coverage_interval(known, in_tre)
+    area, area_low, area_high = roc_interval(confident)
     return {
         "measure": label,
         "half": half,
@@ -218,7 +254,9 @@ def summary(label, half, rows):
         "tre_region_low": tre_low,
         "tre_region_high": tre_high,
         "sandwich_alone": coverage(known, lambda r: r.distance <= REGION_95),
-        "roc_area": roc_area(successes, failures),
+        "roc_area": area,
+        "roc_area_low": area_low,
+        "roc_area_high": area_high,
         "sure_failures": share(v >= 0.9 for v in failures),
         "sure_successes": share(v >= 0.9 for v in successes),
     }
@@ -335,7 +373,8 @@ def rows_of_populations(chosen):
 
 
 def tables_of(rows, measures, halves):
-    """How well predictions hold: of every half, measure and kind of X-rays."""
+    """How well predictions hold: of every half and measure; of those judged also of every variant of X-rays, of every
+    measure on each, and of every kind of patients."""
     table = [
         summary(label, half, [r for r in rows if r.is_for_fit == is_for_fit and label in ("all", r.measure)])
         for half, is_for_fit in halves.items()
@@ -343,7 +382,11 @@ def tables_of(rows, measures, halves):
     ]
     judged = [row for row in rows if not row.is_for_fit]
     for variant in dict.fromkeys(row.variant for row in rows):
-        table.append(summary("all, " + variant, list(halves)[-1], [r for r in judged if r.variant == variant]))
+        for label in measures + ["all"]:
+            mine = [r for r in judged if r.variant == variant and label in ("all", r.measure)]
+            table.append(summary(f"{label}, {variant}", list(halves)[-1], mine))
+    for kind in dict.fromkeys(row.kind() for row in judged):
+        table.append(summary("all, " + kind, list(halves)[-1], [r for r in judged if r.kind() == kind]))
     return table
 
 

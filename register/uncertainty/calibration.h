@@ -30,8 +30,8 @@ struct ConfidenceFeatures {
 };
 
 /// Probability that the TRE is below 2.5 mm, by logistic regression on explained_excess() and on
-/// the logarithm of the predicted TRE. NaN where there is no excess. \test
-/// Calibration.ConfidenceFallsWithEveryDoubt \test
+/// the logarithm of the predicted TRE. NaN where there is no excess. A view that cannot be judged
+/// does not count. \test Calibration.ConfidenceFallsWithEveryDoubt \test
 /// Calibration.AViewThatShowsNothingLeavesLittleConfidence
 double success_confidence(const ConfidenceFeatures& features);
 

@@ -40,7 +40,7 @@ struct ViewValue {
 };
 
 /// Limits by what was measured (docs/registration-study.md, Verdicts). An end whose means over the
-/// views are lower is not found: right poses under every stress at once had 0.34 and 0.11 or more.
+/// views are lower is not found: right poses under every stress at once had 0.29 and 0.11 or more.
 inline constexpr double kLeastCoarseMean = 0.2;
 inline constexpr double kLeastFineMean = 0.08;
 

@@ -60,8 +60,8 @@ grep -q sbatch out || fail "no command of Slurm: $(cat out)"
 
 uncertainty=(prefix/libexec/attenuation-fields/jobs/uncertainty.py --presets fast --variants clean)
 "${uncertainty[@]}" pop --judge --csv uncertainty.csv >out 2>err || fail "uncertainty.py: $(cat out err)"
-# gc, all, and all of clean X-rays.
-[[ $(wc -l <uncertainty.csv) == 4 ]] || fail "uncertainty.py wrote $(cat uncertainty.csv)"
+# gc, all, both of clean X-rays, and all of spines.
+[[ $(wc -l <uncertainty.csv) == 6 ]] || fail "uncertainty.py wrote $(cat uncertainty.csv)"
 grep -q '^gc,"all, as stated",' uncertainty.csv || fail "uncertainty.py wrote $(cat uncertainty.csv)"
 # Fields are too coarse for a success, which a fit needs: here is one. What the programs state is what the script would
 # by their constants.

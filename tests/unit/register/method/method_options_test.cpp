@@ -139,15 +139,29 @@ TEST(MethodOptions, ChainsTakeThePlaceOfThePresets) {
   EXPECT_EQ(method.chains[1].stages[1].level, 1);
 }
 
-TEST(Presets, AnEndThatNoVerdictCallsFoundCallsTheLastResort) {
+TEST(Presets, TheLastResortRunsBelowWhatEveryViewOfAFoundPoseHas) {
   const RegistrationOptions robust = preset_options("robust");
   int last_resorts = 0;
+  int again = 0;
   for (const ChainOptions& chain : robust.chains) {
+    again += chain.from_best_end ? 1 : 0;
     if (!chain.is_last_resort()) continue;
     ++last_resorts;
     EXPECT_EQ(chain.only_below, kLeastCoarseOfFound);
+    EXPECT_EQ(again, 0) << "searches about the best end come after all that may find a better one";
   }
   EXPECT_EQ(last_resorts, 1);
+  EXPECT_GT(again, 0);
+}
+
+TEST(Presets, RobustSearchesCorrelationsOfGradientsWidelyAtTwoLevels) {
+  std::vector<int> levels;
+  for (const ChainOptions& chain : preset_options("robust").chains) {
+    const StageOptions& search = chain.stages.front();
+    if (!chain.from_best_end && search.optimizer == "cma-es" && search.similarity.name == "gc")
+      levels.push_back(search.level);
+  }
+  EXPECT_EQ(levels, (std::vector<int>{3, 2}));
 }
 
 TEST(MethodOptions, ALastResortNeedsAChainBeforeIt) {
