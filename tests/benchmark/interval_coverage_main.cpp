@@ -47,6 +47,27 @@ void print_cases(SimulatedStudies setting) {
     }
 }
 
+void print_rare_failures(const SimulatedStudies& setting) {
+  std::printf(
+      "| Cases | Hard patients | Rate: bootstrap over cases | Student over cases | Patients that "
+      "lost a start: Wilson |\n|---|---|---|---|---|\n");
+  for (const std::size_t cases : {28u, 60u})
+    for (const int one_in : {200, 90, 30, 10}) {
+      const af::test::RareFailureCoverage found =
+          af::test::rare_failure_coverage({.cases = cases,
+                                           .hard_share = 1.0 / one_in,
+                                           .studies = setting.studies,
+                                           .seed = setting.seed,
+                                           .replicates = setting.replicates});
+      std::printf("| %zu | one in %d | %.1f %% | %.1f %% | %.1f %% |\n",
+                  cases,
+                  one_in,
+                  100 * found.bootstrap_rate,
+                  100 * found.student_rate,
+                  100 * found.wilson_patients);
+    }
+}
+
 void print_equivalence(const SimulatedStudies& setting) {
   std::printf("| Patients | SD of the logarithm 0.2 | 0.4 | 0.6 | 0.8 |\n|---|---|---|---|---|\n");
   for (const std::size_t cases : {10u, 20u, 30u, 60u}) {
@@ -71,7 +92,8 @@ int main(int argc, char** argv) {
   CLI::App app{
       "Coverage of 95 % intervals in simulated studies with known truth, as tables in Markdown: "
       "Wilson's of independent runs; Wilson's, the bootstrap's and Student's where patients "
-      "differ; and how often equivalence is claimed wrongly."};
+      "differ, and where few patients lose any start; and how often equivalence is claimed "
+      "wrongly."};
   app.add_option("--studies", setting.studies, "Simulated studies of each setting")
       ->capture_default_str();
   app.add_option("--replicates", setting.replicates, "Of the bootstrap")->capture_default_str();
@@ -82,6 +104,8 @@ int main(int argc, char** argv) {
   print_independent(setting);
   std::printf("\n");
   print_cases(setting);
+  std::printf("\n");
+  print_rare_failures(setting);
   std::printf("\n");
   print_equivalence(setting);
   return 0;

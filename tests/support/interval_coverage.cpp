@@ -96,6 +96,35 @@ IntervalCoverage interval_coverage(const SimulatedStudies& setting) {
           share(tre.student)};
 }
 
+RareFailureCoverage rare_failure_coverage(const StudiesOfRareFailures& setting) {
+  const double true_rate = 1.0 - setting.hard_share * setting.lost_share / setting.poses;
+  const double true_failing =
+      setting.hard_share * (1.0 - std::pow(1.0 - setting.lost_share, setting.starts_per_pose));
+  std::uint64_t wilson = 0;
+  Covered rate;
+  for (std::uint64_t study = 0; study < setting.studies; ++study) {
+    HashRandom random(setting.seed, hash64(setting.cases, 0x72617265), study);  // "rare"
+    std::vector<double> rates;
+    std::int64_t failing = 0;
+    for (std::size_t i = 0; i < setting.cases; ++i) {
+      int lost = 0;
+      if (random.uniform() < setting.hard_share)
+        for (int start = 0; start < setting.starts_per_pose; ++start)
+          lost += random.uniform() < setting.lost_share ? 1 : 0;
+      rates.push_back(1.0 - static_cast<double>(lost) / (setting.poses * setting.starts_per_pose));
+      failing += lost > 0 ? 1 : 0;
+    }
+    rate.add(rates, true_rate, study, setting.replicates);
+    const evaluation::ProportionInterval interval =
+        evaluation::wilson_interval(failing, static_cast<std::int64_t>(setting.cases));
+    wilson += interval.low <= true_failing && true_failing <= interval.high ? 1 : 0;
+  }
+  const auto studies = static_cast<double>(setting.studies);
+  return {static_cast<double>(rate.bootstrap) / studies,
+          static_cast<double>(rate.student) / studies,
+          static_cast<double>(wilson) / studies};
+}
+
 double wrong_equivalence_claims(const StudiesAtTheMargin& setting) {
   constexpr double kMarginMm = 0.1;
   std::uint64_t claims = 0;

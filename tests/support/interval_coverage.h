@@ -32,6 +32,28 @@ struct IntervalCoverage {
 
 IntervalCoverage interval_coverage(const SimulatedStudies& setting);
 
+/// Simulated studies in which nearly all patients succeed from every start: each is hard with a
+/// probability of `hard_share`, and one that is loses about `lost_share` of the starts of one pose.
+struct StudiesOfRareFailures {
+  std::size_t cases = 60;
+  int poses = 3;
+  int starts_per_pose = 15;
+  double hard_share = 0.01;
+  double lost_share = 11.0 / 15.0;
+  std::uint64_t studies = 2000;
+  std::uint64_t seed = 1;
+  std::size_t replicates = 2000;  ///< of the bootstrap
+};
+
+/// Shares of the studies whose 95 % intervals hold the truth.
+struct RareFailureCoverage {
+  double bootstrap_rate = 0.0;   ///< of the success rate, over cases
+  double student_rate = 0.0;     ///< an interval that does not exist holds nothing
+  double wilson_patients = 0.0;  ///< of the share of patients that lose a start
+};
+
+RareFailureCoverage rare_failure_coverage(const StudiesOfRareFailures& setting);
+
 /// Simulated studies of the distance between two methods' end poses: the patients' own means are
 /// log-normal about the margin itself, so that whoever claims equivalence is wrong.
 struct StudiesAtTheMargin {

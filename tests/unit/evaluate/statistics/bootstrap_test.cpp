@@ -89,5 +89,17 @@ TEST(IntervalCoverage, OfWilsonsIsNominalForIndependentRuns) {
   }
 }
 
+TEST(IntervalCoverage, OfRatesNearOneIsPoorWhereOfFailingPatientsItIsNot) {
+  test::StudiesOfRareFailures setting;
+  setting.hard_share = 1.0 / 90.0;
+  setting.studies = kStudies;
+  setting.replicates = 400;
+  const test::RareFailureCoverage found = rare_failure_coverage(setting);
+  // In half of these studies (1 - 1/90)^60 no patient fails: no interval of the rate exists.
+  EXPECT_LT(found.bootstrap_rate, 0.60);
+  EXPECT_LT(found.student_rate, 0.60);
+  EXPECT_GT(found.wilson_patients, 0.93 - 0.01);
+}
+
 }  // namespace
 }  // namespace af::evaluation
