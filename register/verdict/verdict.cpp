@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
 #include <vector>
 
@@ -143,15 +142,18 @@ double mean_background(std::span<const ViewValue> values) {
 
 double explained_excess(std::span<const ViewValue> values) {
   double sum_of_inverses = 0.0;
+  bool has_blind_view = false;
   int count = 0;
   for (const ViewValue& value : values) {
     if (!std::isfinite(value.fine)) continue;
     const double excess = value.fine - value.background;
     if (!std::isfinite(excess)) return std::nan("");
-    sum_of_inverses += excess > 0.0 ? 1.0 / excess : std::numeric_limits<double>::infinity();
+    has_blind_view = has_blind_view || excess <= 0.0;
+    sum_of_inverses += 1.0 / excess;
     ++count;
   }
-  return count > 0 ? count / sum_of_inverses : std::nan("");
+  if (count == 0) return std::nan("");
+  return has_blind_view ? 0.0 : count / sum_of_inverses;
 }
 
 ViewSummary summary_of(std::span<const ViewValue> values, double ViewValue::*value) {
