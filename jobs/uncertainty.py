@@ -6,6 +6,7 @@ numbers, and prints how well they do on the others. Patients that were not drawn
 Needs nothing but Python."""
 import argparse
 import csv
+import hashlib
 import math
 import os
 import pathlib
@@ -316,7 +317,8 @@ def options():
     parser.add_argument("--variants", default="clean,all", help="comma separated, as in the population [%(default)s]")
     parser.add_argument("--judge", action="store_true", help="fit nothing: judge all patients by what the programs foretold")
     parser.add_argument("--csv", metavar="FILE", help="the table, as CSV")
-    parser.add_argument("--commit", metavar="HASH", help="a last column of it: the commit of the programs")
+    parser.add_argument("--commit", metavar="HASH",
+                        help="last columns of it: the commit of the programs, and 16 digits of the SHA-256 of all tables read")
     chosen = parser.parse_args()
     chosen.presets = list(dict.fromkeys(chosen.presets.split(",")))
     chosen.variants = list(dict.fromkeys(chosen.variants.split(",")))
@@ -354,8 +356,8 @@ def finished_tables(population, condition):
 
 
 def rows_of_populations(chosen):
-    """All registrations of all folders; a patient may be in one of them alone."""
-    rows, seen = [], {}
+    """All registrations of all folders, and the SHA-256 of their tables; a patient may be in one of them alone."""
+    rows, seen, digest = [], {}, hashlib.sha256()
     for preset in chosen.presets:
         for variant in chosen.variants:
             condition = f"{variant}-2-{preset}"
@@ -369,7 +371,8 @@ def rows_of_populations(chosen):
                         refuse(path, f"{seen[run]} has the same patient, too")
                     seen[run] = path
                     rows += rows_of(path, MEASURE_OF[preset], variant)
-    return rows
+                    digest.update(path.read_bytes())
+    return rows, digest.hexdigest()
 
 
 def tables_of(rows, measures, halves):
@@ -390,20 +393,21 @@ def tables_of(rows, measures, halves):
     return table
 
 
-def write_csv(path, table, commit):
+def write_csv(path, table, origin):
+    """`origin`: last cells of every row."""
     with open(path, "w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(table[0]) + (["commit"] if commit else []), lineterminator="\n")
+        writer = csv.DictWriter(file, [*table[0], *origin], lineterminator="\n")
         writer.writeheader()
         for entry in table:
             cells = {k: f"{v:.4f}" if isinstance(v, float) else v for k, v in entry.items()}
-            writer.writerow({**cells, "commit": commit} if commit else cells)
+            writer.writerow({**cells, **origin})
 
 
 def main():
     chosen = options()
     if chosen.csv and not os.access(pathlib.Path(chosen.csv).parent, os.W_OK):
         refuse(chosen.csv, "its folder is missing or cannot be written to")
-    rows = rows_of_populations(chosen)
+    rows, digest = rows_of_populations(chosen)
     measures = list(dict.fromkeys(row.measure for row in rows))
     if chosen.judge:
         take_as_stated(rows)
@@ -419,7 +423,8 @@ def main():
         print(f"\n{list(halves)[-1]}: {measure}")
         print("\n".join(reliability([r for r in rows if not r.is_for_fit and measure in ("all", r.measure)])))
     if chosen.csv:
-        write_csv(chosen.csv, table, chosen.commit)
+        origin = {"commit": chosen.commit, "source_sha256": digest[:16]} if chosen.commit else {}
+        write_csv(chosen.csv, table, origin)
 
 
 if __name__ == "__main__":
