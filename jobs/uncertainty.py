@@ -59,7 +59,7 @@ class Row:
         self.confidence = 0.0
 
     def kind(self):
-        """Of patient: the name without its number."""
+        """Of the patient: the name without its number."""
         return re.sub(r"-\d+$", "", self.patient)
 
     def shortfall(self):
@@ -195,7 +195,7 @@ def roc_interval(rows):
         areas.append(roc_area(groups, times))
     areas = [area for area in areas if not math.isnan(area)]
     alike = [1.0] * len(areas)
-    low, high = [weighted_quantile(areas, alike, share) if areas else math.nan for share in (0.025, 0.975)]
+    low, high = [weighted_quantile(areas, alike, level) if areas else math.nan for level in (0.025, 0.975)]
     return roc_area(groups), low, high
 
 

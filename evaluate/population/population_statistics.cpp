@@ -195,8 +195,8 @@ PopulationSuccess population_success(const std::vector<const PatientOutcomes*>& 
     result.patients_with_failures += success.successes < success.starts ? 1 : 0;
     result.patients.push_back(std::move(success));
   }
-  for (const double threshold_mm : kLadderMm)
-    result.below_ladder.push_back(count_successes(all, threshold_mm));
+  for (std::size_t i = 0; i < kLadderMm.size(); ++i)
+    result.below_ladder[i] = count_successes(all, kLadderMm[i]);
   result.share_with_failures = wilson_interval(result.patients_with_failures,
                                                static_cast<std::int64_t>(result.patients.size()));
   result.rate = rate_over(result.patients, counting);

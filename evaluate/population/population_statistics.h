@@ -2,6 +2,7 @@
 // Success of many patients, each the unit that is sampled.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -61,7 +62,7 @@ struct PopulationSuccess {
   std::vector<PatientSuccess> patients;
   std::int64_t starts = 0;
   std::int64_t successes = 0;
-  std::vector<std::int64_t> below_ladder;  ///< ends below each threshold of kLadderMm
+  std::array<std::int64_t, kLadderMm.size()> below_ladder = {};  ///< ends below each threshold
   /// How many lost a start. Of a rate near 1 it says more than the rate's intervals, which are too
   /// narrow where few patients lose many.
   std::int64_t patients_with_failures = 0;

@@ -74,8 +74,7 @@ std::vector<NamedCell> success_of(const PopulationSuccess& success) {
       {"share_with_failures_high", number(success.share_with_failures.high)}};
   for (std::size_t i = 0; i < kLadderMm.size(); ++i)
     cells.push_back(
-        {"below_" + number_text(kLadderMm[i]) + "_mm",
-         i < success.below_ladder.size() ? std::to_string(success.below_ladder[i]) : ""});
+        {"below_" + number_text(kLadderMm[i]) + "_mm", std::to_string(success.below_ladder[i])});
   return cells;
 }
 
@@ -92,19 +91,21 @@ std::string patient_cells(const PopulationSuccess& success) {
          std::to_string(success.patients_with_failures) + " | " + std::to_string(success.starts);
 }
 
-/// The share of ends below a threshold of the ladder.
-std::string below_text(const PopulationSuccess& success, double threshold_mm) {
-  const auto found = std::find(kLadderMm.begin(), kLadderMm.end(), threshold_mm);
-  const auto count = static_cast<double>(
-      success.below_ladder.at(static_cast<std::size_t>(found - kLadderMm.begin())));
-  return percent(count / static_cast<double>(success.starts));
+/// The ladder's thresholds that the table shows.
+constexpr std::size_t kBelow1Mm = 0;
+constexpr std::size_t kBelow5Mm = 3;
+static_assert(kLadderMm[kBelow1Mm] == 1.0 && kLadderMm[kBelow5Mm] == 5.0);
+
+std::string below_text(const PopulationSuccess& success, std::size_t threshold) {
+  return percent(static_cast<double>(success.below_ladder[threshold]) /
+                 static_cast<double>(success.starts));
 }
 
 std::string success_cells(const PopulationSuccess& success) {
   return percent(success.rate.value) + " | " + percent(success.rate.bootstrap.low) + " to " +
          percent(success.rate.bootstrap.high) + " | " + percent(success.rate.student.low) + " to " +
-         percent(success.rate.student.high) + " | " + below_text(success, 1.0) + " / " +
-         below_text(success, 5.0) + " | " + (success.pooled.is_whole_study() ? ">= " : "") +
+         percent(success.rate.student.high) + " | " + below_text(success, kBelow1Mm) + " / " +
+         below_text(success, kBelow5Mm) + " | " + (success.pooled.is_whole_study() ? ">= " : "") +
          millimetre_text(success.pooled.initial_tre_mm) + " | " +
          millimetre_text(success.capture_mm.value) + " (" +
          millimetre_text(success.capture_mm.bootstrap.low) + " to " +

@@ -181,10 +181,7 @@ void add_uncertainty(Method& method, const RegistrationResult& result, Registrat
   std::vector<registration::ViewValue> values;
   if (result.has_pose())
     values = method.examiner->view_values(result.room_from_ct, method.estimator->is_on());
-  row.judge = summary_of(values, &registration::ViewValue::coarse);
-  row.judge_fine = summary_of(values, &registration::ViewValue::fine);
-  row.judge_background = registration::mean_background(values);
-  row.judge_excess = registration::explained_excess(values);
+  row.judge = registration::judge_summary(values);
   row.uncertainty = method.estimator->report(result, values);
   if (!std::isfinite(row.uncertainty.covariance_deg_mm[0])) return;
   const PoseParameters error = PoseParameters::from_deg_and_mm(row.final_deg_mm);

@@ -88,9 +88,7 @@ registration::NamedCells cells_of(const RegistrationRow& row,
       {"translation_error_mm", number_text(errors.translation_mm)},
       {"error", row.error}};
   if (parts.uncertainty) {
-    registration::append(registration::judge_cells(
-                             row.judge, row.judge_fine, row.judge_background, row.judge_excess),
-                         before_seconds);
+    registration::append(registration::judge_cells(row.judge), before_seconds);
     registration::append(registration::uncertainty_cells(row.uncertainty, row.chain_distance_mm),
                          before_seconds);
     before_seconds.emplace_back("squared_distance", number_text(row.squared_distance));

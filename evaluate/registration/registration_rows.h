@@ -59,10 +59,8 @@ struct RegistrationRow {
   bool is_corrected = false;  ///< a correction was wanted
   registration::CorrectionReport correction;
   // What the registration says of itself, without the gold pose; NaN where it was not asked.
-  registration::ViewSummary judge = {kMissing, kMissing};
-  registration::ViewSummary judge_fine = {kMissing, kMissing};
-  double judge_background = kMissing;  ///< mean over the views
-  double judge_excess = kMissing;      ///< registration::explained_excess()
+  registration::JudgeSummary judge = {
+      {kMissing, kMissing}, {kMissing, kMissing}, kMissing, kMissing};
   registration::UncertaintyReport uncertainty;
   double chain_distance_mm = kMissing;
   double squared_distance = kMissing;  ///< Mahalanobis, of the error by the covariance
@@ -92,9 +90,6 @@ struct RegistrationRow {
                     is_corrected,
                     correction,
                     judge,
-                    judge_fine,
-                    judge_background,
-                    judge_excess,
                     uncertainty,
                     chain_distance_mm,
                     squared_distance,

@@ -57,16 +57,13 @@ NamedCells correction_cells(const std::optional<CorrectionReport>& correction) {
   return cells;
 }
 
-NamedCells judge_cells(const ViewSummary& coarse,
-                       const ViewSummary& fine,
-                       double background,
-                       double excess) {
-  return {{"judge_mean", number_text(coarse.mean)},
-          {"judge_lowest_view", number_text(coarse.lowest)},
-          {"judge_fine_mean", number_text(fine.mean)},
-          {"judge_fine_lowest_view", number_text(fine.lowest)},
-          {"judge_fine_background", number_text(background)},
-          {"judge_excess", number_text(excess)}};
+NamedCells judge_cells(const JudgeSummary& judge) {
+  return {{"judge_mean", number_text(judge.coarse.mean)},
+          {"judge_lowest_view", number_text(judge.coarse.lowest)},
+          {"judge_fine_mean", number_text(judge.fine.mean)},
+          {"judge_fine_lowest_view", number_text(judge.fine.lowest)},
+          {"judge_fine_background", number_text(judge.background)},
+          {"judge_excess", number_text(judge.excess)}};
 }
 
 NamedCells uncertainty_cells(const UncertaintyReport& report, double chain_distance_mm) {

@@ -46,12 +46,7 @@ NamedCells registration_row(const RegistrationCells& row,
 /// What a correction adds before the time; empty cells where there was none.
 NamedCells correction_cells(const std::optional<CorrectionReport>& correction);
 
-/// What the judge says of an end: means and lowest values over the views, mean_background(),
-/// explained_excess().
-NamedCells judge_cells(const ViewSummary& coarse,
-                       const ViewSummary& fine,
-                       double background,
-                       double excess);
+NamedCells judge_cells(const JudgeSummary& judge);
 
 /// Uncertainty: predicted TREs, confidence, inflations, distance of the chains, and the
 /// covariance's upper triangle as `cov_rx_rx` (deg^2), `cov_rx_tx` (deg mm) ... `cov_tz_tz` (mm^2).

@@ -256,11 +256,7 @@ NamedCells cells_of(const RegistrationRecord& record,
   row.seconds = result.seconds;
   NamedCells before_seconds = {{"relative_to", "nominal"},
                                {"verdict", to_string(judgement_of(record).verdict)}};
-  append(judge_cells(summary_of(record.view_values, &ViewValue::coarse),
-                     summary_of(record.view_values, &ViewValue::fine),
-                     mean_background(record.view_values),
-                     explained_excess(record.view_values)),
-         before_seconds);
+  append(judge_cells(judge_summary(record.view_values)), before_seconds);
   append(uncertainty_cells(record.uncertainty, result.chain_distance_mm), before_seconds);
   if (result.correction.has_value()) append(correction_cells(result.correction), before_seconds);
   return registration_row(row, {}, before_seconds);

@@ -35,7 +35,8 @@ constexpr std::array kInflation = {
     InflationRow{"", {2.50, 8.00}, {2.50, 8.00}},
 };
 
-/// Of success_confidence(), likewise, to the registrations of caf419aa.
+/// Of success_confidence(), likewise, to the registrations of caf419aa, whose tables have the mean
+/// of the views' backgrounds alone (docs/uncertainty.md says how little that matters).
 constexpr double kConfidenceAtOnce = -2.46;
 constexpr double kConfidenceByExcess = 44.41;
 constexpr double kConfidenceByTre = -0.88;

@@ -169,4 +169,11 @@ ViewSummary summary_of(std::span<const ViewValue> values, double ViewValue::*val
   return summary;
 }
 
+JudgeSummary judge_summary(std::span<const ViewValue> values) {
+  return {summary_of(values, &ViewValue::coarse),
+          summary_of(values, &ViewValue::fine),
+          mean_background(values),
+          explained_excess(values)};
+}
+
 }  // namespace af::registration

@@ -97,4 +97,15 @@ double mean_background(std::span<const ViewValue> values);
 /// \test PoseExaminer.AViewThatShowsNothingLeavesNoExcess
 double explained_excess(std::span<const ViewValue> values);
 
+/// What the views' values say together.
+struct JudgeSummary {
+  ViewSummary coarse;
+  ViewSummary fine;
+  double background = 0.0;  ///< mean_background()
+  double excess = 0.0;      ///< explained_excess()
+
+  auto members() { return std::tie(coarse, fine, background, excess); }
+};
+JudgeSummary judge_summary(std::span<const ViewValue> values);
+
 }  // namespace af::registration

@@ -88,7 +88,7 @@ std::string file_page() {
       << code_list(names_of(registration_row({}, {}, {})))
       << "\n\nWith `--correct`: " << code_list(names_of(correction_cells({})))
       << ".\n\nWithout `--no-uncertainty` ([uncertainty.md](../uncertainty.md)): "
-      << code_list(names_of(judge_cells({}, {}, 0.0, 0.0))) << ", "
+      << code_list(names_of(judge_cells({}))) << ", "
       << code_list(names_of(uncertainty_cells({}, 0.0))) << ".\n\n"
       << "## summary.json\n\nIn the folder of a finished run of `af-evaluate`; `af-evaluate "
       << "report` reads it. Numbers that are not known are null.\n\n"
