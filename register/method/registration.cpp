@@ -44,10 +44,10 @@ struct PortfolioEnd : ChainEnd {
 
 /// Ends that are worth at least this share of the best one to the judge, and lie farther than this
 /// from every better one, are finished, too. The judge looks coarsely: it preferred wrong ends by
-/// up to 5 % where the finish gave right ones values that were a third higher
-/// (docs/robust-tuning.md).
+/// up to 5 % where the finish gave right ones values that were a third higher. The finish errs,
+/// too: at 0.8 it chose ends of a real skull that were worth 0.82 (docs/robust-tuning.md).
 /// \test Registration.TheFinishChoosesAmongEndsThatTheJudgeHardlyTellsApart
-constexpr double kRivalShare = 0.8;
+constexpr double kRivalShare = 0.9;
 constexpr double kRivalDistanceMm = 1.0;
 
 bool is_converged(StopReason reason) {
