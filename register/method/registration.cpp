@@ -535,14 +535,15 @@ ObjectiveValue RegistrationRunner::similarity_at(const RigidTransform& room_from
 
 ObjectiveValue RegistrationRunner::similarity_at(const RigidTransform& room_from_ct,
                                                  std::size_t stage) {
-  check(stage < impl_->stages.size(), "no such stage");
-  if (!impl_->stages[stage].narrow_to(*impl_->problem, room_from_ct)) return inadmissible_value();
-  return impl_->stages[stage].objective.evaluate(room_from_ct);
+  MultiViewObjective* const objective = objective_at(room_from_ct, stage);
+  return objective == nullptr ? inadmissible_value() : objective->evaluate(room_from_ct);
 }
 
-MultiViewObjective& RegistrationRunner::objective(std::size_t stage) {
+MultiViewObjective* RegistrationRunner::objective_at(const RigidTransform& room_from_ct,
+                                                     std::size_t stage) {
   check(stage < impl_->stages.size(), "no such stage");
-  return impl_->stages[stage].objective;
+  PreparedStage& prepared = impl_->stages[stage];
+  return prepared.narrow_to(*impl_->problem, room_from_ct) ? &prepared.objective : nullptr;
 }
 
 const RegistrationProblem& RegistrationRunner::problem() const {

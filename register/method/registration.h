@@ -96,9 +96,11 @@ class RegistrationRunner {
   /// The objective of one stage, counted over the chains, at a pose.
   [[nodiscard]] ObjectiveValue similarity_at(const RigidTransform& room_from_ct, std::size_t stage);
 
-  /// The objective of a stage, counted over the chains. It lives as long as the runner; no run may
-  /// use it at the same time.
-  [[nodiscard]] MultiViewObjective& objective(std::size_t stage);
+  /// The objective of a stage, counted over the chains; of one that looks within silhouettes, over
+  /// those at a pose. nullptr when too little of them is visible. It lives until the next call or
+  /// run.
+  [[nodiscard]] MultiViewObjective* objective_at(const RigidTransform& room_from_ct,
+                                                 std::size_t stage);
 
   [[nodiscard]] const RegistrationProblem& problem() const;
   [[nodiscard]] const RegistrationOptions& options() const;

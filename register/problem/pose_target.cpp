@@ -3,6 +3,8 @@
 
 #include <utility>
 
+#include <Eigen/Eigenvalues>
+
 #include "geometry/point_projector.h"
 #include "register/optimizer/curvature_bounds.h"
 
@@ -12,6 +14,10 @@ namespace {
 /// A parameter that moves projections by less than this (for example a translation along the only
 /// view's beam) is scaled as if it moved them by this much, which keeps its steps finite.
 constexpr double kSmallestDisplacementMm = 1e-3;
+
+/// Motions that move projections less than this (of squares that are 1 for single parameters) are
+/// taken to move them so much, likewise.
+constexpr double kLeastEigenvalue = 1e-6;
 
 /// Where measures that reweight their residuals curve less than this share of what their normal
 /// equations say, searches take them to curve by this share.
@@ -26,26 +32,57 @@ bool projects_into(const PointProjector& projector,
          pixel.y() >= roi.row - 0.5 && pixel.y() < roi.row + roi.height - 0.5;
 }
 
-/// Lengths of the image velocities on the isocentre plane of a point that moves by each parameter.
-ScaledParameters image_speeds(const PointProjector& projector,
-                              const Eigen::Vector3d& room_point,
-                              const Eigen::Vector3d& center_room_point,
-                              double isocenter_depth_mm) {
+using ImageVelocities = Eigen::Matrix<double, 3, 6>;
+
+/// The image velocities (room axes) on the isocentre plane of a point that moves by each parameter.
+ImageVelocities image_velocities(const PointProjector& projector,
+                                 const Eigen::Vector3d& room_point,
+                                 const Eigen::Vector3d& center_room_point,
+                                 double isocenter_depth_mm) {
   const Eigen::Vector3d& beam = projector.beam_direction();
   const Eigen::Vector3d from_source = room_point - projector.camera().source_point;
   const double depth = beam.dot(from_source);
   const Eigen::Vector3d arm = room_point - center_room_point;
-  ScaledParameters speeds;
+  ImageVelocities velocities;
   for (int axis = 0; axis < 3; ++axis) {
     const Eigen::Vector3d unit = Eigen::Vector3d::Unit(axis);
-    const auto speed = [&](const Eigen::Vector3d& velocity) {
-      return (velocity - from_source * (beam.dot(velocity) / depth)).norm() * isocenter_depth_mm /
-             depth;
+    const auto in_image = [&](const Eigen::Vector3d& velocity) -> Eigen::Vector3d {
+      return (velocity - from_source * (beam.dot(velocity) / depth)) * isocenter_depth_mm / depth;
     };
-    speeds[axis] = speed(unit.cross(arm));
-    speeds[axis + 3] = speed(unit);
+    velocities.col(axis) = in_image(unit.cross(arm));
+    velocities.col(axis + 3) = in_image(unit);
   }
-  return speeds;
+  return velocities;
+}
+
+/// add(velocities) of every view for every point that projects into the region of at least one;
+/// returns how often.
+template <typename Add>
+std::size_t for_each_velocity(const RigidTransform& room_from_ct,
+                              const Eigen::Vector3d& center_ct_mm,
+                              std::span<const Eigen::Vector3d> points_ct,
+                              std::span<const View> views,
+                              const Eigen::Vector3d& isocenter_point,
+                              const Add& add) {
+  const Eigen::Vector3d center_room_point = room_from_ct * center_ct_mm;
+  std::vector<PointProjector> projectors;
+  for (const View& view : views) projectors.emplace_back(view.camera);
+  std::size_t count = 0;
+  for (const Eigen::Vector3d& ct_point : points_ct) {
+    const Eigen::Vector3d point = room_from_ct * ct_point;
+    bool is_seen = false;
+    for (std::size_t i = 0; i < views.size() && !is_seen; ++i)
+      is_seen = projects_into(projectors[i], views[i].roi, point);
+    if (!is_seen) continue;
+    for (const PointProjector& projector : projectors) {
+      // For another view, a point beside its source has no image.
+      if (!(projector.depth_mm(point) > 0.0)) continue;
+      add(image_velocities(
+          projector, point, center_room_point, projector.depth_mm(isocenter_point)));
+      ++count;
+    }
+  }
+  return count;
 }
 
 std::vector<Eigen::Vector3d> cell_centers(int points_per_axis) {
@@ -96,29 +133,43 @@ std::optional<ParameterScaling> projected_motion_scaling(const RigidTransform& r
                                                          std::span<const Eigen::Vector3d> points_ct,
                                                          std::span<const View> views,
                                                          const Eigen::Vector3d& isocenter_point) {
-  const Eigen::Vector3d center_room_point = room_from_ct * center_ct_mm;
-  std::vector<PointProjector> projectors;
-  for (const View& view : views) projectors.emplace_back(view.camera);
   ScaledParameters sums = ScaledParameters::Zero();
-  std::size_t count = 0;
-  for (const Eigen::Vector3d& ct_point : points_ct) {
-    const Eigen::Vector3d point = room_from_ct * ct_point;
-    bool is_seen = false;
-    for (std::size_t i = 0; i < views.size() && !is_seen; ++i)
-      is_seen = projects_into(projectors[i], views[i].roi, point);
-    if (!is_seen) continue;
-    for (const PointProjector& projector : projectors) {
-      // For another view, a point beside its source has no image.
-      if (!(projector.depth_mm(point) > 0.0)) continue;
-      sums +=
-          image_speeds(projector, point, center_room_point, projector.depth_mm(isocenter_point));
-      ++count;
-    }
-  }
+  const std::size_t count = for_each_velocity(
+      room_from_ct,
+      center_ct_mm,
+      points_ct,
+      views,
+      isocenter_point,
+      [&](const ImageVelocities& velocities) { sums += velocities.colwise().norm().transpose(); });
   if (count == 0) return std::nullopt;
   ParameterScaling scaling;
   scaling.displacement_mm = (sums / static_cast<double>(count)).cwiseMax(kSmallestDisplacementMm);
   return scaling;
+}
+
+std::optional<PoseMatrix> projected_motion_basis(const RigidTransform& room_from_ct,
+                                                 const Eigen::Vector3d& center_ct_mm,
+                                                 std::span<const Eigen::Vector3d> points_ct,
+                                                 std::span<const View> views,
+                                                 const Eigen::Vector3d& isocenter_point) {
+  PoseMatrix squares = PoseMatrix::Zero();
+  const std::size_t count = for_each_velocity(
+      room_from_ct,
+      center_ct_mm,
+      points_ct,
+      views,
+      isocenter_point,
+      [&](const ImageVelocities& velocities) { squares += velocities.transpose() * velocities; });
+  if (count == 0) return std::nullopt;
+  squares /= static_cast<double>(count);
+  const PoseVector sizes = squares.diagonal().cwiseSqrt().cwiseMax(kSmallestDisplacementMm);
+  // In parameters of like size, so that eigenvectors do not depend on units.
+  const PoseMatrix alike =
+      sizes.cwiseInverse().asDiagonal() * squares * sizes.cwiseInverse().asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<PoseMatrix> solver(alike);
+  const PoseVector lengths = solver.eigenvalues().cwiseMax(kLeastEigenvalue).cwiseSqrt();
+  return sizes.cwiseInverse().asDiagonal() * solver.eigenvectors() *
+         lengths.cwiseInverse().asDiagonal();
 }
 
 PoseTarget::PoseTarget(MultiViewObjective& objective,

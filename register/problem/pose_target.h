@@ -41,6 +41,18 @@ std::optional<ParameterScaling> projected_motion_scaling(const RigidTransform& r
                                                          std::span<const View> views,
                                                          const Eigen::Vector3d& isocenter_point);
 
+/// Six small motions (columns; rx, ry, rz about the room's axes through `center_ct_mm`, rad, then
+/// tx, ty, tz, mm), each of which moves the projections of the same points by 1 mm, root mean
+/// square over points and views, and independently of the others: the sum of their squared
+/// parameters is the mean squared displacement. One of them is nearly a translation along the beam
+/// where there is but one view. nullopt when no point projects into a region. \test
+/// ProjectedMotionBasis.MakesMotionsOfOneMillimetre
+std::optional<PoseMatrix> projected_motion_basis(const RigidTransform& room_from_ct,
+                                                 const Eigen::Vector3d& center_ct_mm,
+                                                 std::span<const Eigen::Vector3d> points_ct,
+                                                 std::span<const View> views,
+                                                 const Eigen::Vector3d& isocenter_point);
+
 /// The poses that a stage searches: scaled parameters about the stage's start, judged by its
 /// objective. \test PoseTarget.DerivativesAreThoseOfItsValue
 class PoseTarget final : public OptimizationTarget {

@@ -21,6 +21,7 @@ struct Inflation {
 
 struct InflationRow {
   const char* similarity;
+  bool in_silhouette;
   Inflation pose;
   Inflation tre;
 };
@@ -29,17 +30,25 @@ struct InflationRow {
 /// caf419aa; mi's is an earlier fit to cases of one phantom (docs/uncertainty.md). The last row is
 /// for measures that were not fitted: the most cautious of them.
 constexpr std::array kInflation = {
-    InflationRow{"rg", {0.09, 2.95}, {-0.10, 1.05}},
-    InflationRow{"gc", {0.00, 1.90}, {-0.47, 1.00}},
-    InflationRow{"mi", {2.50, 8.00}, {2.50, 8.00}},
-    InflationRow{"", {2.50, 8.00}, {2.50, 8.00}},
+    InflationRow{"rg", false, {0.09, 2.95}, {-0.10, 1.05}},
+    InflationRow{"gc", false, {0.00, 1.90}, {-0.47, 1.00}},
+    InflationRow{"gc", true, {0.00, 0.00}, {0.00, 0.00}},
+    InflationRow{"mi", false, {2.50, 8.00}, {2.50, 8.00}},
+    InflationRow{"", false, {2.50, 8.00}, {2.50, 8.00}},
+};
+
+/// The coefficients of a logistic regression.
+struct Confidence {
+  double at_once;
+  double by_excess;
+  double by_log_tre;
 };
 
 /// Of success_confidence(), likewise, to the registrations of caf419aa, whose tables have the mean
 /// of the views' backgrounds alone (docs/uncertainty.md says how little that matters).
-constexpr double kConfidenceAtOnce = -2.46;
-constexpr double kConfidenceByExcess = 44.41;
-constexpr double kConfidenceByTre = -0.88;
+constexpr Confidence kOverRegions{-2.46, 44.41, -0.88};
+/// Of drawn bones of odd numbers, jobs/bones.sh.
+constexpr Confidence kInSilhouettes{-9.91, 4.96, -9.39};
 
 /// Smaller shares are treated as this one.
 constexpr double kLeastShare = 0.05;
@@ -47,6 +56,10 @@ constexpr double kLeastShare = 0.05;
 /// not show; a missing one counts as the farthest.
 constexpr double kNearMm = 0.1;
 constexpr double kFarMm = 20.0;
+
+bool are_in_silhouettes(std::span<const ViewValue> view_values) {
+  return !view_values.empty() && view_values.front().in_silhouette;
+}
 
 double factor_of(const Inflation& inflation, double share) {
   if (!std::isfinite(share)) return share;
@@ -59,9 +72,10 @@ double factor_of(const Inflation& inflation, double share) {
 CovarianceInflation covariance_inflation(const std::string& similarity,
                                          std::span<const ViewValue> view_values) {
   const double share = summary_of(view_values, &ViewValue::fine).mean;
+  const bool in_silhouette = are_in_silhouettes(view_values);
   const auto* const row =
       std::find_if(kInflation.begin(), kInflation.end() - 1, [&](const InflationRow& candidate) {
-        return similarity == candidate.similarity;
+        return similarity == candidate.similarity && in_silhouette == candidate.in_silhouette;
       });
   return {factor_of(row->pose, share), factor_of(row->tre, share)};
 }
@@ -70,9 +84,9 @@ double success_confidence(const ConfidenceFeatures& features) {
   const double tre_mm = std::isfinite(features.sandwich_tre_mm)
                             ? std::clamp(features.sandwich_tre_mm, kNearMm, kFarMm)
                             : kFarMm;
-  const double logit = kConfidenceAtOnce +
-                       kConfidenceByExcess * explained_excess(features.view_values) +
-                       kConfidenceByTre * std::log(tre_mm);
+  const Confidence& by = are_in_silhouettes(features.view_values) ? kInSilhouettes : kOverRegions;
+  const double logit = by.at_once + by.by_excess * explained_excess(features.view_values) +
+                       by.by_log_tre * std::log(tre_mm);
   return 1.0 / (1.0 + std::exp(-logit));
 }
 

@@ -2,6 +2,7 @@
 #include "register/uncertainty/pose_information.h"
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 
 namespace af::registration {
 namespace {
@@ -12,14 +13,12 @@ PoseVector sum_of(const TileScores& scores) {
   return sum;
 }
 
-/// The views' gradients beside the origin of `frame`, at `step` of parameter `k`; empty where that
-/// is inadmissible.
+/// The views' gradients beside the origin of `frame`, after a small motion; empty where that is
+/// inadmissible.
 std::vector<PoseVector> gradients_beside(MultiViewObjective& objective,
                                          const PoseFrame& frame,
-                                         int k,
-                                         double step) {
-  PoseParameters parameters;
-  (k < 3 ? parameters.rotation_rad[k] : parameters.translation_mm[k - 3]) = step;
+                                         const PoseVector& motion) {
+  const PoseParameters parameters{motion.head<3>(), motion.tail<3>()};
   std::vector<TileScores> scores;
   objective.evaluate_scores(pose_from_parameters(frame, parameters),
                             frame.center_room_mm + parameters.translation_mm,
@@ -33,22 +32,20 @@ std::vector<PoseVector> gradients_beside(MultiViewObjective& objective,
 
 }  // namespace
 
-PoseMatrix bent_curvature(const PoseMatrix& curvature, const ParameterScaling& scaling) {
-  const PoseVector& scale = scaling.displacement_mm;
-  const PoseMatrix scaled =
-      scale.cwiseInverse().asDiagonal() * curvature * scale.cwiseInverse().asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<PoseMatrix> solver(scaled);
+PoseMatrix bent_curvature(const PoseMatrix& curvature, const PoseMatrix& basis) {
+  const Eigen::SelfAdjointEigenSolver<PoseMatrix> solver(basis.transpose() * curvature * basis);
   const double largest = solver.eigenvalues()[5];
   if (!(largest > 0.0)) return PoseMatrix::Zero();
   const PoseVector kept = solver.eigenvalues().cwiseMax(kLeastRelativeCurvature * largest);
   const PoseMatrix bent =
       solver.eigenvectors() * kept.asDiagonal() * solver.eigenvectors().transpose();
-  return scale.asDiagonal() * bent * scale.asDiagonal();
+  const PoseMatrix back = basis.inverse();
+  return back.transpose() * bent * back;
 }
 
 std::optional<PoseInformation> information_at(MultiViewObjective& objective,
                                               const PoseFrame& frame,
-                                              const ParameterScaling& scaling,
+                                              const PoseMatrix& basis,
                                               int tiles) {
   std::vector<TileScores> here;
   const RigidTransform pose = pose_from_parameters(frame, {});
@@ -62,21 +59,23 @@ std::optional<PoseInformation> information_at(MultiViewObjective& objective,
   }
   information.view_curvatures.assign(here.size(), PoseMatrix::Zero());
   for (int k = 0; k < 6; ++k) {
-    const double step = kInformationStepMm / scaling.displacement_mm[k];
-    std::vector<PoseVector> ahead = gradients_beside(objective, frame, k, step);
-    std::vector<PoseVector> behind = gradients_beside(objective, frame, k, -step);
+    const PoseVector motion = kInformationStepMm * basis.col(k);
+    std::vector<PoseVector> ahead = gradients_beside(objective, frame, motion);
+    std::vector<PoseVector> behind = gradients_beside(objective, frame, -motion);
     if (ahead.empty() && behind.empty()) return std::nullopt;
-    const double way = ahead.empty() || behind.empty() ? step : 2.0 * step;
+    const double way = (ahead.empty() || behind.empty() ? 1.0 : 2.0) * kInformationStepMm;
     if (ahead.empty()) ahead = center;
     if (behind.empty()) behind = center;
     for (std::size_t view = 0; view < center.size(); ++view)
       information.view_curvatures[view].col(k) = (behind[view] - ahead[view]) / way;
   }
+  const PoseMatrix back = basis.inverse();
   for (PoseMatrix& view : information.view_curvatures) {
+    view *= back;
     view = 0.5 * (view + view.transpose().eval());
     information.curvature += view;
   }
-  information.curvature = bent_curvature(information.curvature, scaling);
+  information.curvature = bent_curvature(information.curvature, basis);
   return information;
 }
 

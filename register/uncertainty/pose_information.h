@@ -20,23 +20,25 @@ struct PoseInformation {
 };
 
 /// The information at the origin of `frame`. Curvature by central differences of the gradient over
-/// kInformationStepMm of mean projected motion (`scaling`) to both sides, or to one where the other
-/// is inadmissible; 13 evaluations. nullopt where neither is admissible. The measures must have
-/// derivatives. \test PoseInformation.OfAQuadraticObjectiveIsItsHessian
+/// kInformationStepMm of projected motion (`basis`, of projected_motion_basis()) to both sides, or
+/// to one where the other is inadmissible; 13 evaluations. nullopt where neither is admissible. The
+/// measures must have derivatives. Along the room's axes instead, depth would be the difference of
+/// motions that X-rays show a thousand times better, where there is one view.
+/// \test PoseInformation.OfAQuadraticObjectiveIsItsHessian
 std::optional<PoseInformation> information_at(MultiViewObjective& objective,
                                               const PoseFrame& frame,
-                                              const ParameterScaling& scaling,
+                                              const PoseMatrix& basis,
                                               int tiles);
 
 /// Long enough to average over a field's nodes, short beside the way over which curvatures change.
 inline constexpr double kInformationStepMm = 0.2;
 
-/// Curvatures below this share of the largest, in scaled parameters, are raised to it: differences
-/// cannot tell them from zero or from an upward bend.
+/// Curvatures below this share of the largest, per squared projected motion, are raised to it:
+/// differences cannot tell them from zero or from an upward bend.
 inline constexpr double kLeastRelativeCurvature = 1e-2;
 
-/// The matrix, in scaled parameters, with its eigenvalues no less than kLeastRelativeCurvature of
-/// the largest; zero where that is not positive. \test BentCurvature.KeepsDirectionsThatAreKnown
-PoseMatrix bent_curvature(const PoseMatrix& curvature, const ParameterScaling& scaling);
+/// The matrix with its eigenvalues in `basis` no less than kLeastRelativeCurvature of the largest;
+/// zero where that is not positive. \test BentCurvature.KeepsDirectionsThatAreKnown
+PoseMatrix bent_curvature(const PoseMatrix& curvature, const PoseMatrix& basis);
 
 }  // namespace af::registration

@@ -48,8 +48,7 @@ UncertaintyEstimator::UncertaintyEstimator(std::shared_ptr<const RegistrationPro
                                            const UncertaintyOptions& options,
                                            std::shared_ptr<ThreadPool> pool)
     : problem_(std::move(problem)), options_(options) {
-  // Values within silhouettes are on another scale than those that the calibration has seen.
-  if (options_.is_left_out || method.silhouette_mm() > 0.0) return;
+  if (options_.is_left_out) return;
   for (const RegistrationView& view : problem_->views) views_.push_back(view.view);
   ChainOptions ends{"ends", {}};
   for (const ChainOptions& chain : method.chains) {
@@ -75,14 +74,16 @@ double UncertaintyEstimator::add_covariance(const RegistrationResult& result,
                                             std::span<const ViewValue> view_values,
                                             UncertaintyReport& report) {
   const PoseFrame frame = PoseFrame::about(result.room_from_ct, problem_->center_ct_mm);
-  const auto scaling = projected_motion_scaling(result.room_from_ct,
-                                                problem_->center_ct_mm,
-                                                problem_->scaling_points_ct,
-                                                views_,
-                                                problem_->isocenter_point);
-  if (!scaling.has_value()) return UncertaintyReport::kNone;
+  const auto basis = projected_motion_basis(result.room_from_ct,
+                                            problem_->center_ct_mm,
+                                            problem_->scaling_points_ct,
+                                            views_,
+                                            problem_->isocenter_point);
+  if (!basis.has_value()) return UncertaintyReport::kNone;
   const std::size_t stage = stage_of_chain_.at(result.chain);
-  const auto information = information_at(ends_->objective(stage), frame, *scaling, kTiles);
+  MultiViewObjective* const objective = ends_->objective_at(result.room_from_ct, stage);
+  if (objective == nullptr) return UncertaintyReport::kNone;
+  const auto information = information_at(*objective, frame, *basis, kTiles);
   if (!information.has_value()) return UncertaintyReport::kNone;
   const auto sandwich = sandwich_covariance(*information);
   if (!sandwich.has_value()) return UncertaintyReport::kNone;

@@ -29,8 +29,7 @@ struct UncertaintyOptions {
 class UncertaintyEstimator {
  public:
   /// `problem` and `method`: as for the RegistrationRunner of the results. Reports stay empty when
-  /// uncertainty is left out, when the method looks within silhouettes, and when X-rays have no
-  /// gradients to measure the curvature.
+  /// uncertainty is left out, and when X-rays have no gradients to measure the curvature.
   UncertaintyEstimator(std::shared_ptr<const RegistrationProblem> problem,
                        const RegistrationOptions& method,
                        const UncertaintyOptions& options,

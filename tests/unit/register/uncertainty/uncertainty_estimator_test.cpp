@@ -2,6 +2,7 @@
 // What objectives say about poses, and what registrations of noisy X-rays make of it.
 #include "register/uncertainty/uncertainty_estimator.h"
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <random>
@@ -93,9 +94,11 @@ TEST(PoseInformation, OfAQuadraticObjectiveIsItsHessian) {
                                  std::make_shared<LinearRenderer>(frame),
                                  std::make_shared<PlainSquares>(xray),
                                  std::nullopt}});
-  ParameterScaling scaling;
-  scaling.displacement_mm.head<3>().setConstant(50.0);
-  const auto information = information_at(objective, frame, scaling, 4);
+  PoseVector sizes = PoseVector::Ones();
+  sizes.head<3>().setConstant(1.0 / 50.0);
+  PoseMatrix basis = sizes.asDiagonal();
+  basis(3, 4) = 3.0;  // not the parameters themselves
+  const auto information = information_at(objective, frame, basis, 4);
   ASSERT_TRUE(information.has_value());
   PoseMatrix hessian = PoseMatrix::Zero();
   std::vector<PoseVector> scores(16, PoseVector::Zero());
@@ -117,10 +120,10 @@ TEST(PoseInformation, OfAQuadraticObjectiveIsItsHessian) {
 TEST(BentCurvature, KeepsDirectionsThatAreKnown) {
   PoseVector sizes;
   sizes << 100, 50, 20, 10, 5, -3;
-  const PoseMatrix bent = bent_curvature(sizes.asDiagonal(), ParameterScaling());
+  const PoseMatrix bent = bent_curvature(sizes.asDiagonal(), PoseMatrix::Identity());
   sizes[5] = kLeastRelativeCurvature * 100;
   EXPECT_TRUE(bent.isApprox(PoseMatrix(sizes.asDiagonal()), 1e-12));
-  EXPECT_TRUE(bent_curvature(-PoseMatrix::Identity(), ParameterScaling()).isZero());
+  EXPECT_TRUE(bent_curvature(-PoseMatrix::Identity(), PoseMatrix::Identity()).isZero());
 }
 
 /// Sums of squares from start to end, at one resolution.
@@ -245,18 +248,66 @@ TEST(UncertaintyEstimator, SaysNothingWhereNoViewCanBeJudged) {
   EXPECT_TRUE(std::isnan(report.tre_95_mm));
 }
 
-TEST(UncertaintyEstimator, SaysNothingOfStagesWithinSilhouettes) {
-  const test::SmallCase small = test::small_case();
+/// What is said of the gold pose by gradient correlation; `silhouette_mm`: 0 for the whole region.
+UncertaintyReport report_at_gold(const test::SmallCase& small, double silhouette_mm) {
   RegistrationOptions options = squares();
-  options.chains.front().stages.front().silhouette_mm = 5.0;
+  StageOptions& stage = options.chains.front().stages.front();
+  stage.similarity.name = "gc";
+  stage.silhouette_mm = silhouette_mm;
   RegistrationResult result;
   result.room_from_ct = small.gold_room_from_ct;
   result.similarity = 1.0;
   result.chain = "squares";
-  const UncertaintyReport report = UncertaintyEstimator(small.problem, options, {})
-                                       .report(result, std::vector<ViewValue>{{1, 1}});
-  EXPECT_TRUE(std::isnan(report.covariance_deg_mm[0]));
-  EXPECT_TRUE(std::isnan(report.confidence));
+  const bool in_silhouette = silhouette_mm > 0.0;
+  return UncertaintyEstimator(small.problem, options, {})
+      .report(result, std::vector<ViewValue>{{0.8, 0.8, in_silhouette, 0.1}});
+}
+
+/// Adds stripes, which no DRR has, where nothing of the image is nearer than `far_px`.
+void add_stripes_beside(Image2d& image, int far_px) {
+  const Image2d bones = image;
+  for (int row = 0; row < bones.height; ++row)
+    for (int column = 0; column < bones.width; ++column) {
+      bool is_far = true;
+      for (int y = std::max(0, row - far_px); y < std::min(bones.height, row + far_px + 1); ++y)
+        for (int x = std::max(0, column - far_px); x < std::min(bones.width, column + far_px + 1);
+             ++x)
+          is_far = is_far && bones.at(x, y) == 0.0f;
+      if (is_far) image.at(column, row) += static_cast<float>(column % 3);
+    }
+}
+
+TEST(UncertaintyEstimator, LooksWithinSilhouettesWhereTheStageDoes) {
+  // The margin is 2.6 pixels, gradients reach one farther.
+  constexpr double kMarginMm = 5.0;
+  constexpr int kFarPx = 5;
+  const test::SmallCase small = test::small_case(test::bones_in_a_corner());
+  const test::SmallCase striped = test::small_case(test::bones_in_a_corner());
+  std::mt19937_64 random(17);
+  std::normal_distribution<float> noise(0.0f, 0.02f);
+  for (std::size_t i = 0; i < small.problem->views.size(); ++i) {
+    Image2d& plain = small.problem->views[i].xray;
+    Image2d& with_stripes = striped.problem->views[i].xray;
+    add_stripes_beside(with_stripes, kFarPx);
+    EXPECT_NE(with_stripes.pixels, plain.pixels);
+    for (std::size_t pixel = 0; pixel < plain.pixels.size(); ++pixel) {
+      const float value = noise(random);
+      plain.pixels[pixel] += value;
+      with_stripes.pixels[pixel] += value;
+    }
+  }
+  const UncertaintyReport within = report_at_gold(small, kMarginMm);
+  ASSERT_GT(within.covariance_deg_mm[0], 0.0);
+  EXPECT_TRUE(std::isfinite(within.confidence));
+  EXPECT_EQ(report_at_gold(striped, kMarginMm).covariance_deg_mm, within.covariance_deg_mm);
+  EXPECT_NE(report_at_gold(striped, 0.0).covariance_deg_mm,
+            report_at_gold(small, 0.0).covariance_deg_mm);
+}
+
+TEST(UncertaintyEstimator, SaysNothingWhereNoSilhouetteIsSeen) {
+  test::SmallCase small = test::small_case(test::bones_in_a_corner());
+  small.gold_room_from_ct.pretranslate(Eigen::Vector3d(0.0, 0.0, 300.0));
+  EXPECT_TRUE(std::isnan(report_at_gold(small, 5.0).covariance_deg_mm[0]));
 }
 
 TEST(UncertaintyEstimator, IsSilentWhereTheMeasureThatStandsInRefusesTheXray) {
