@@ -18,6 +18,8 @@ base_packages=(
   invesalius-examples
 )
 benchmark_packages=(plastimatch libfaiss-dev libopenblas-dev)
+# What jobs/peers.sh registers with.
+peer_packages=(plastimatch elastix python3-torch python3-nlopt)
 # Formatter, linters, the browser that opens the report in a test, and what reads manual pages and completions in tests.
 lint_packages=(clang-format-14 clang-tidy-14 shellcheck chromium groff-base bsdextrautils zsh)
 # Large, and only one test and one example of the Python module need it; they are skipped without it.
@@ -26,7 +28,7 @@ slurm_packages=(slurm-wlm munge)
 
 usage() {
   cat <<'TEXT'
-Usage: jobs/install-packages.sh [--with-lint] [--with-benchmarks] [--with-slurm] [--with-torch] [--check] [--help]
+Usage: jobs/install-packages.sh [--with-lint] [--with-benchmarks] [--with-slurm] [--with-torch] [--with-peers] [--check] [--help]
 
 Installs the Debian 12 packages that the project needs to build, run and pass its tests. Says what it does; does
 nothing when all are there. Needs root or sudo only to install.
@@ -36,6 +38,7 @@ nothing when all are there. Needs root or sudo only to install.
   --with-benchmarks   also what tests/benchmark/run.sh compares with (plastimatch, Faiss, OpenBLAS)
   --with-slurm        also a Slurm of one node, for tests/slurm
   --with-torch        also PyTorch, for the test and the example of differentiable DRRs
+  --with-peers        also what jobs/peers.sh compares with (plastimatch, elastix, PyTorch, NLopt for Python)
   --check             only say what is missing; exit 1 when something is
 TEXT
 }
@@ -52,6 +55,7 @@ main() {
       --with-benchmarks) packages+=("${benchmark_packages[@]}") ;;
       --with-slurm) packages+=("${slurm_packages[@]}") ;;
       --with-torch) packages+=("${torch_packages[@]}") ;;
+      --with-peers) packages+=("${peer_packages[@]}") ;;
       --check) check_only=yes ;;
       --help | -h) usage; return 0 ;;
       *)

@@ -15,9 +15,10 @@ Usage: jobs/peers.sh [OPTIONS]
 
 Simulates a phantom's X-rays, clean and stressed, and registers them from the same starts: by fields and by ray casting
 (presets), by automatic differentiation in PyTorch (evaluate/peers/autodiff_registration.py) and by plastimatch's DRRs
-with Nelder and Mead's search (evaluate/peers/plastimatch_registration.py). Says what Debian's elastix answers to its
-ray-casting interpolator. Writes peers.csv. After a stop, run the same command again to continue. Needs the programs in
-build/release/bin; peers that are not installed are left out, and it says so.
+with two optimisers of af-register, nelder-mead and bobyqa (evaluate/peers/plastimatch_registration.py). Says what
+Debian's elastix answers to its ray-casting interpolator. Writes peers.csv. After a stop, run the same command again to
+continue. Needs the programs in build/release/bin; peers that are not installed (jobs/install-packages.sh --with-peers)
+are left out, and it says so.
 
   --output DIR             where everything goes                                                             [./peers]
   --kind KIND              phantom: spine, pelvis or head                                                      [spine]
@@ -25,7 +26,7 @@ build/release/bin; peers that are not installed are left out, and it says so.
   --intervals N            from 0 mm                                                                               [8]
   --autodiff-starts N      of these, evenly, for automatic differentiation; 0: all                                 [0]
   --plastimatch-starts N   of these, evenly, for plastimatch; 0: all                                              [10]
-  --python PROGRAM         a Python with numpy, scipy and torch                                     [/usr/bin/python3]
+  --python PROGRAM         a Python with numpy, nlopt and torch                                     [/usr/bin/python3]
   --seed N                 of the true pose, noise and starts                                                      [1]
   --help
 TEXT
@@ -70,7 +71,7 @@ field() {
   local file="$output/fields/$1-$2.af.h5" begin=$EPOCHREALTIME
   touch "$output/.stages/before"
   stage "field-$1-$2" "$file" "$bin/af-precompute" --study "$output/studies/$1/study.toml" --camera "$2" \
-    --uv-nodes 12 --st-nodes 256 --slabs 4 --codewords 8192 --max-rotation-deg 15 --max-translation-mm 30 -o "$file"
+    --max-rotation-deg 15 --max-translation-mm 30 -o "$file"
   [[ ! "$file" -nt "$output/.stages/before" ]] ||
     awk -v a="$begin" -v b="$EPOCHREALTIME" 'BEGIN {print b - a}' >"$file.seconds"
 }
@@ -84,12 +85,13 @@ evaluate() {
     --intervals "$intervals" --seed "$seed" -o "$output/runs/$name" "$@"
 }
 
-# peer NAME CASE SCRIPT STARTS: another program's poses, judged by our errors.
+# peer NAME CASE SCRIPT STARTS [OPTIONS...]: another program's poses, judged by our errors.
 peer() {
   local name=$1 case_name=$2 script=$3 most=$4 poses="$output/poses/$2-$1.csv"
+  shift 4
   stage "$case_name-$name-poses" "$poses" "$python" "$af_root/evaluate/peers/$script" \
     --study "$output/studies/$case_name/study.toml" --case "$kind" --starts "$output/starts/$case_name/starts.csv" \
-    --most "$most" -o "$poses"
+    --most "$most" "$@" -o "$poses"
   local stage_inputs
   # shellcheck disable=SC2034  # for stage()
   stage_inputs="$(state_of "$poses")"
@@ -122,10 +124,12 @@ for variant in clean stressed; do
   else
     say "automatic differentiation: left out, $python has no torch"
   fi
-  if command -v plastimatch >/dev/null && has_python numpy,scipy; then
-    peer plastimatch "$case_name" plastimatch_registration.py "$plastimatch_starts"
+  if command -v plastimatch >/dev/null && has_python numpy,nlopt; then
+    for optimizer in nelder-mead bobyqa; do
+      peer "plastimatch-$optimizer" "$case_name" plastimatch_registration.py "$plastimatch_starts" --optimizer "$optimizer"
+    done
   else
-    say "plastimatch: left out, it or scipy is not installed"
+    say "plastimatch: left out, it or python3-nlopt is not installed"
   fi
 done
 

@@ -9,9 +9,9 @@ usage() {
   cat <<'TEXT'
 Usage: jobs/table-data.sh DIR [OUT]
 
-Writes the tables behind docs/paper-experiments.md from the runs in DIR (jobs/paper-experiments.sh), or those behind
-docs/population.md from the tables in DIR (jobs/population.sh), to OUT [docs/data], as CSVs of some kilobytes. Every row
-ends with the commit of the programs and the SHA-256 of the file in DIR that it was taken from.
+Writes the tables behind docs/paper-experiments.md from the runs in DIR (jobs/paper-experiments.sh), those behind
+docs/population.md from the tables in DIR (jobs/population.sh), or that of docs/peers.md (jobs/peers.sh), to OUT [docs/data], as
+CSVs of some kilobytes. Every row ends with the commit of the programs and the SHA-256 of the file in DIR that it was taken from.
 TEXT
 }
 
@@ -22,7 +22,7 @@ if (($# < 1 || $# > 2)) || [[ "$1" == --help || "$1" == -h ]]; then
 fi
 runs="$1/runs"
 out="${2:-$af_root/docs/data}"
-[[ -d "$runs" || -f "$1/tables/population.csv" ]] || die 4 "$1: holds no folder runs/ of jobs/paper-experiments.sh, nor tables/ of jobs/population.sh"
+[[ -d "$runs" || -f "$1/tables/population.csv" || -f "$1/peers.csv" ]] || die 4 "$1: holds no folder runs/ of jobs/paper-experiments.sh, nor tables/ of jobs/population.sh, nor peers.csv of jobs/peers.sh"
 commit=$(git -C "$af_root" rev-parse --short=12 HEAD)
 mkdir -p "$out"
 
@@ -39,6 +39,11 @@ add() {
   tail -n +2 "$file" | awk -v first="${value:+$value,}" -v last=",$commit,$sum" '{print first $0 last}' >>"$target"
 }
 
+if [[ -f "$1/peers.csv" ]]; then
+  rm -f "$out/peers.csv"
+  add peers "$1/peers.csv"
+  exit
+fi
 if [[ -f "$1/tables/population.csv" ]]; then
   rm -f "$out"/population{,-patients,-intervals}.csv
   add population "$1/tables/population.csv"

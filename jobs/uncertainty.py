@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """Whether registrations know their own errors: fits the constants of register/uncertainty/calibration.cpp to the
-registrations from two views of a population study (jobs/population.sh), whose truth is known, on the patients of odd
+registrations of a population study (jobs/population.sh, jobs/bones.sh), whose truth is known, on the patients of odd
 numbers, and prints how well they do on the others. Patients that were not drawn, which have no number, are never fitted.
 Needs nothing but Python."""
 import argparse
@@ -15,22 +15,22 @@ import re
 import sys
 
 # The measures that the presets end with.
-MEASURE_OF = {"robust": "rg", "fast": "gc", "paper": "mi"}
+MEASURE_OF = {"robust": "rg", "fast": "gc", "paper": "mi", "bone": "gc in silhouettes"}
 REGION_95 = 12.591587243743977  # chi-square, six degrees of freedom
-SUCCESS_TRE_MM = 2.5
+SUCCESS_MM = 2.5
 NEAR_MM, FAR_MM = 0.1, 20.0
 LEAST_SHARE = 0.05
 
 
 # What is read of a table of registrations.
-COLUMNS = ["case", "tre_mm", "judge_fine_mean", "judge_excess", "covariance_inflation", "tre_inflation", "squared_distance",
+COLUMNS = ["case", "tre_mm", "mrpd_mm", "judge_fine_mean", "judge_excess", "covariance_inflation", "tre_inflation", "squared_distance",
            "predicted_tre_rms_mm", "predicted_tre_95_mm", "confidence"]
 
 
 class Row:
-    """What is needed of one registration."""
+    """What is needed of one registration. It succeeded by its TRE; by its mRPD with one view, which shows no depth."""
 
-    def __init__(self, measure, variant, cells):
+    def __init__(self, measure, variant, views, cells):
         def number(name):
             return float(cells[name]) if cells[name] not in ("", "nan") else math.nan
 
@@ -38,10 +38,10 @@ class Row:
         self.variant = variant
         self.case = f"{cells['case']} {variant}"
         self.patient = re.sub(r"-p\d+$", "", cells["case"])
-        drawn = re.fullmatch(r"(?:spine|pelvis|head)-(\d{3,})-p\d+", cells["case"])
+        drawn = re.fullmatch(r"(?:spine|pelvis|head|bone)-(\d{3,})-p\d+", cells["case"])
         self.is_for_fit = drawn is not None and int(drawn[1]) % 2 == 1
         self.tre = number("tre_mm")
-        self.is_success = self.tre < SUCCESS_TRE_MM
+        self.is_success = (self.tre if views > 1 else number("mrpd_mm")) < SUCCESS_MM
         self.fine_mean = number("judge_fine_mean")
         self.excess = number("judge_excess")
         inflation = number("covariance_inflation")
@@ -117,7 +117,7 @@ def inflation_of(row, constants):
     return math.exp(at_once + growth * row.shortfall())
 
 
-def inflation_text(constants):
+def constants_text(constants):
     return "{" + ", ".join(f"{number:.2f}" for number in constants) + "}"
 
 
@@ -287,14 +287,14 @@ def fit(rows, measures):
         # directions do, and may be foretold too large.
         pose = fit_inflation(fitted, [row.distance / REGION_95 for row in fitted], 0.0)
         tre = fit_inflation(fitted, [(row.tre / row.tre_95) ** 2 for row in fitted], -math.inf)
-        print(f'    InflationRow{{"{measure}", {inflation_text(pose)}, {inflation_text(tre)}}},')
+        print(f'    InflationRow{{"{measure}", {constants_text(pose)}, {constants_text(tre)}}},')
         for row in mine:
             if row.has_pose:
                 row.inflation = inflation_of(row, pose)
                 row.tre_inflation = inflation_of(row, tre)
     coefficients = fit_confidence([row for row in rows if row.is_for_fit and row.has_confidence])
-    for name, value in zip(["AtOnce", "ByExcess", "ByTre"], coefficients):
-        print(f"constexpr double kConfidence{name} = {value:.2f};")
+    name = "kInSilhouettes" if measures == [MEASURE_OF["bone"]] else "kOverRegions"
+    print(f"constexpr Confidence {name}{constants_text(coefficients)};")
     for row in rows:
         # Ends that the verdict calls not found have none, whatever the constants.
         if row.has_confidence and row.stated_confidence != 0.0:
@@ -312,9 +312,10 @@ def options():
     parser = argparse.ArgumentParser(
         description=__doc__, epilog="Exit codes: 0 done, 2 wrong options, 4 registrations that are missing, damaged or without predictions, or none to fit."
     )
-    parser.add_argument("population", nargs="+", type=pathlib.Path, help="output folders of jobs/population.sh")
+    parser.add_argument("population", nargs="+", type=pathlib.Path, help="output folders of jobs/population.sh or jobs/bones.sh")
     parser.add_argument("--presets", default="robust,fast", help="comma separated [%(default)s]")
     parser.add_argument("--variants", default="clean,all", help="comma separated, as in the population [%(default)s]")
+    parser.add_argument("--views", type=int, choices=(1, 2), default=2, help="of the registrations [%(default)s]")
     parser.add_argument("--judge", action="store_true", help="fit nothing: judge all patients by what the programs foretold")
     parser.add_argument("--csv", metavar="FILE", help="the table, as CSV")
     parser.add_argument("--commit", metavar="HASH",
@@ -325,6 +326,8 @@ def options():
     for preset in chosen.presets:
         if preset not in MEASURE_OF:
             parser.error(f"--presets names '{preset}': must be some of {', '.join(MEASURE_OF)}")
+    if "bone" in chosen.presets and len(chosen.presets) > 1:
+        parser.error(f"--presets = '{','.join(chosen.presets)}': values within silhouettes have constants of their own, give bone alone")
     return chosen
 
 
@@ -333,7 +336,7 @@ def refuse(what, why):
     sys.exit(4)
 
 
-def rows_of(path, measure, variant):
+def rows_of(path, measure, variant, views):
     with open(path, newline="", encoding="utf-8") as file:
         table = csv.DictReader(file)
         missing = [column for column in COLUMNS if column not in (table.fieldnames or [])]
@@ -343,7 +346,7 @@ def rows_of(path, measure, variant):
         for cells in table:
             if any(cells[column] is None for column in COLUMNS):
                 refuse(path, f"line {table.line_num} is cut off")
-            rows.append(Row(measure, variant, cells))
+            rows.append(Row(measure, variant, views, cells))
     if not rows:
         refuse(path, "holds no registration")
     return rows
@@ -360,17 +363,17 @@ def rows_of_populations(chosen):
     rows, seen, digest = [], {}, hashlib.sha256()
     for preset in chosen.presets:
         for variant in chosen.variants:
-            condition = f"{variant}-2-{preset}"
+            condition = f"{variant}-{chosen.views}-{preset}"
             for folder in chosen.population:
                 tables = finished_tables(folder, condition)
                 if not tables:
-                    refuse(folder, f"holds no finished run of {condition} of jobs/population.sh")
+                    refuse(folder, f"holds no finished run of {condition} of jobs/population.sh or jobs/bones.sh")
                 for path in tables:
                     run = f"{condition}/{path.parent.name}"
                     if run in seen:
                         refuse(path, f"{seen[run]} has the same patient, too")
                     seen[run] = path
-                    rows += rows_of(path, MEASURE_OF[preset], variant)
+                    rows += rows_of(path, MEASURE_OF[preset], variant, chosen.views)
                     digest.update(path.read_bytes())
     return rows, digest.hexdigest()
 

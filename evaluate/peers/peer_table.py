@@ -10,7 +10,7 @@ import statistics
 import sys
 
 SUCCESS_TRE_MM = 2.5
-METHODS = ("robust", "fast", "paper", "autodiff", "plastimatch")
+METHODS = ("robust", "fast", "paper", "autodiff", "plastimatch-nelder-mead", "plastimatch-bobyqa")
 
 
 def numbers(rows, column):

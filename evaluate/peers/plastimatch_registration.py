@@ -1,21 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Registration with the DRRs of plastimatch (`plastimatch drr`, a process per DRR) and the simplex search of Nelder and
-Mead (scipy) on the sum of the views' cross-correlations of gradients. Needs plastimatch, numpy and scipy.
+"""Registration with the DRRs of plastimatch (`plastimatch drr`, a process per DRR) and an optimiser of af-register's that
+needs no derivatives: NLopt's, called as register/optimizer/nlopt_search.cpp does. It maximises the sum of the views'
+correlations of gradients. Needs plastimatch, numpy and nlopt (Debian's python3-nlopt).
 
     python3 evaluate/peers/plastimatch_registration.py --study study.toml --case NAME --starts starts.csv -o poses.csv
 """
+import contextlib
 import pathlib
 import subprocess
 import tempfile
 
+import nlopt
 import numpy as np
-import scipy.optimize
 
 from peer_case import PeerCase, moved, options_of, run
 
 FACTOR = 4  # pixels so many times as wide
 MOST_POSES = 220
+OPTIMIZERS = {"nelder-mead": nlopt.LN_NELDERMEAD, "bobyqa": nlopt.LN_BOBYQA}
 FIRST_STEPS = np.array([0.06, 0.06, 0.06, 5.0, 5.0, 5.0])  # rad, mm
+FINAL_STEP = 0.02  # of the first ones, so 0.1 mm
 
 
 def write_mha(path, values, ct_from_index):
@@ -82,8 +86,31 @@ def gradient_correlation(a, b):
     return 0.5 * total
 
 
+def best_of(optimizer, value):
+    """The scaled parameters where value(parameters) was highest, searched from 0."""
+    best = (-np.inf, np.zeros(6))
+
+    def seen(scaled, _):
+        nonlocal best
+        now = value(scaled)
+        if now > best[0]:
+            best = (now, scaled.copy())
+        return now
+
+    search = nlopt.opt(OPTIMIZERS[optimizer], 6)
+    search.set_max_objective(seen)
+    search.set_initial_step(1.0)
+    search.set_xtol_abs(FINAL_STEP)
+    search.set_maxeval(MOST_POSES)
+    with contextlib.suppress(nlopt.RoundoffLimited):  # where rounding stopped BOBYQA's steps
+        search.optimize(np.zeros(6))
+    return best[1]
+
+
 def main():
-    options = options_of(__doc__).parse_args()
+    parser = options_of(__doc__)
+    parser.add_argument("--optimizer", choices=OPTIMIZERS, default="nelder-mead", help="of af-register's [nelder-mead]")
+    options = parser.parse_args()
     case = PeerCase(options.study, options.case)
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
@@ -91,18 +118,14 @@ def main():
         projectors = [Projector(view, folder) for view in case.views]
 
         def register(start):
-            def cost(scaled):
-                pose = moved(start, case.center_ct, scaled * FIRST_STEPS)
-                return -sum(gradient_correlation(p(pose), p.xray) for p in projectors)
+            def pose_of(scaled):
+                return moved(start, case.center_ct, scaled * FIRST_STEPS)
 
-            simplex = np.vstack([np.zeros(6), np.eye(6)])
-            found = scipy.optimize.minimize(
-                cost,
-                np.zeros(6),
-                method="Nelder-Mead",
-                options={"initial_simplex": simplex, "maxfev": MOST_POSES, "xatol": 0.005, "fatol": 1e-5},
-            )
-            return moved(start, case.center_ct, found.x * FIRST_STEPS)
+            def value(scaled):
+                pose = pose_of(scaled)
+                return sum(gradient_correlation(p(pose), p.xray) for p in projectors)
+
+            return pose_of(best_of(options.optimizer, value))
 
         run(options, register)
 

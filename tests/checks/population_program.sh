@@ -69,21 +69,29 @@ cp -r pop right
 awk -F, -v OFS=, 'NR == 1 { for (i = 1; i <= NF; ++i) if ($i == "tre_mm") tre = i } NR == 2 { $tre = 0.5 } 1' \
   pop/runs/clean-2-fast/spine-001/registrations.csv >right/runs/clean-2-fast/spine-001/registrations.csv
 "${uncertainty[@]}" right >fitted 2>err || fail "uncertainty.py: $(cat err)"
-grep -q '^constexpr double kConfidenceByExcess = ' fitted || fail "uncertainty.py fitted $(cat fitted)"
-python3 - "$root/register/uncertainty/calibration.cpp" pop/runs/clean-2-fast/spine-001/registrations.csv <<'PYTHON' || fail "uncertainty.py differs from calibration.cpp"
+grep -q '^constexpr Confidence kOverRegions{' fitted || fail "uncertainty.py fitted $(cat fitted)"
+prefix/libexec/attenuation-fields/jobs/bones.sh --output bones --bones 1 --intervals 3 --ranks 2 >out 2>err || fail "bones.sh: $(cat out err)"
+grep -q '^clean-2-bone,all,1,3,' bones/tables/population.csv || fail "bones.sh wrote $(cat bones/tables/population.csv)"
+prefix/libexec/attenuation-fields/jobs/uncertainty.py bones --presets bone --variants clean >fitted 2>err || fail "uncertainty.py: $(cat err)"
+grep -q '^constexpr Confidence kInSilhouettes{' fitted || fail "uncertainty.py fitted $(cat fitted)"
+python3 - "$root/register/uncertainty/calibration.cpp" kOverRegions pop/runs/clean-2-fast/spine-001/registrations.csv \
+  kInSilhouettes bones/runs/clean-2-bone/bone-001/registrations.csv <<'PYTHON' || fail "uncertainty.py differs from calibration.cpp"
 import csv, re, sys
 sys.path.insert(0, "prefix/libexec/attenuation-fields/jobs")
 import uncertainty
 text = open(sys.argv[1], encoding="utf-8").read()
-constants = [float(re.search(f"kConfidence{name} = ([-0-9.]+);", text)[1]) for name in ("AtOnce", "ByExcess", "ByTre")]
-rows = [uncertainty.Row("gc", "clean", cells) for cells in csv.DictReader(open(sys.argv[2], encoding="utf-8"))]
-stated = [row for row in rows if row.has_confidence and row.stated_confidence != 0.0]
-assert stated, "no row states a confidence"
-for row in stated:
-    expected = uncertainty.probability(constants, row.features())
-    assert abs(row.stated_confidence - expected) < 1e-9, (row.case, row.stated_confidence, expected)
+for name, path in zip(sys.argv[2::2], sys.argv[3::2]):
+    constants = [float(number) for number in re.search(name + r"\{([-0-9., ]+)\};", text)[1].split(",")]
+    rows = [uncertainty.Row("gc", "clean", 2, cells) for cells in csv.DictReader(open(path, encoding="utf-8"))]
+    stated = [row for row in rows if row.has_confidence and row.stated_confidence != 0.0]
+    assert stated, "no row states a confidence"
+    for row in stated:
+        expected = uncertainty.probability(constants, row.features())
+        assert abs(row.stated_confidence - expected) < 1e-9, (row.case, row.stated_confidence, expected)
 PYTHON
-refuse 2 "must be some of robust, fast, paper" "${uncertainty[@]}" --presets bone pop
+refuse 2 "must be some of robust, fast, paper, bone" "${uncertainty[@]}" --presets leg pop
+refuse 2 "give bone alone" "${uncertainty[@]}" --presets bone,fast pop
+refuse 4 'holds no finished run of clean-1-robust' "${uncertainty[@]}" --presets robust --views 1 pop
 refuse 4 'holds no finished run of clean-2-fast' "${uncertainty[@]}" missing
 refuse 4 'has the same patient, too' "${uncertainty[@]}" pop pop
 refuse 4 'its folder is missing' "${uncertainty[@]}" pop --judge --csv nowhere/uncertainty.csv
