@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Tables of pages as small CSVs, from a folder of paper-experiments.sh or population.sh.
+# Tables of pages as small CSVs, from a folder of paper-experiments.sh, population.sh or peers.sh.
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"

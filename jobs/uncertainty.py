@@ -20,6 +20,7 @@ REGION_95 = 12.591587243743977  # chi-square, six degrees of freedom
 SUCCESS_MM = 2.5
 NEAR_MM, FAR_MM = 0.1, 20.0
 LEAST_SHARE = 0.05
+LEAST_EXCESS = 0.02
 
 
 # What is read of a table of registrations.
@@ -69,7 +70,8 @@ class Row:
     def features(self):
         """The distance of a portfolio's ends is none of them: where no portfolio fails it would stand for success."""
         tre = FAR_MM if math.isnan(self.tre_rms) else min(max(self.tre_rms, NEAR_MM), FAR_MM)
-        return [1.0, self.excess, math.log(tre)]
+        excess = math.log(max(self.excess, LEAST_EXCESS)) if self.measure == MEASURE_OF["bone"] else self.excess
+        return [1.0, excess, math.log(tre)]
 
 
 def weighted_quantile(values, weights, share):
@@ -287,7 +289,8 @@ def fit(rows, measures):
         # directions do, and may be foretold too large.
         pose = fit_inflation(fitted, [row.distance / REGION_95 for row in fitted], 0.0)
         tre = fit_inflation(fitted, [(row.tre / row.tre_95) ** 2 for row in fitted], -math.inf)
-        print(f'    InflationRow{{"{measure}", {constants_text(pose)}, {constants_text(tre)}}},')
+        name, is_in_silhouettes = ("gc", "true") if measure == MEASURE_OF["bone"] else (measure, "false")
+        print(f'    InflationRow{{"{name}", {is_in_silhouettes}, {constants_text(pose)}, {constants_text(tre)}}},')
         for row in mine:
             if row.has_pose:
                 row.inflation = inflation_of(row, pose)
@@ -315,7 +318,7 @@ def options():
     parser.add_argument("population", nargs="+", type=pathlib.Path, help="output folders of jobs/population.sh or jobs/bones.sh")
     parser.add_argument("--presets", default="robust,fast", help="comma separated [%(default)s]")
     parser.add_argument("--variants", default="clean,all", help="comma separated, as in the population [%(default)s]")
-    parser.add_argument("--views", type=int, choices=(1, 2), default=2, help="of the registrations [%(default)s]")
+    parser.add_argument("--views", type=int, choices=(1, 2), default=2, help="of the registrations; those of one view are judged alone (--judge) [%(default)s]")
     parser.add_argument("--judge", action="store_true", help="fit nothing: judge all patients by what the programs foretold")
     parser.add_argument("--csv", metavar="FILE", help="the table, as CSV")
     parser.add_argument("--commit", metavar="HASH",
@@ -326,6 +329,8 @@ def options():
     for preset in chosen.presets:
         if preset not in MEASURE_OF:
             parser.error(f"--presets names '{preset}': must be some of {', '.join(MEASURE_OF)}")
+    if chosen.views == 1 and not chosen.judge:
+        parser.error("--views = 1: needs --judge, because success of one view is another one (by mRPD) and no constants of its own are fitted")
     if "bone" in chosen.presets and len(chosen.presets) > 1:
         parser.error(f"--presets = '{','.join(chosen.presets)}': values within silhouettes have constants of their own, give bone alone")
     return chosen

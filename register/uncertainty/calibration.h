@@ -29,9 +29,10 @@ struct ConfidenceFeatures {
   double sandwich_tre_mm = 0.0;  ///< as predicted, before inflation; NaN counts as no prediction
 };
 
-/// Probability that the TRE is below 2.5 mm, by logistic regression on explained_excess() and on
-/// the logarithm of the predicted TRE. NaN where there is no excess. A view that cannot be judged
-/// does not count. \test Calibration.ConfidenceFallsWithEveryDoubt \test
+/// Probability that the TRE is below 2.5 mm, by logistic regression on explained_excess(), of
+/// values within silhouettes its logarithm, and on the logarithm of the predicted TRE. NaN where
+/// there is no excess. A view that cannot be judged does not count. \test
+/// Calibration.ConfidenceFallsWithEveryDoubt \test
 /// Calibration.AViewThatShowsNothingLeavesLittleConfidence
 double success_confidence(const ConfidenceFeatures& features);
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "register/uncertainty/pose_information.h"
 
+#include <algorithm>
+
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
@@ -28,6 +30,15 @@ std::vector<PoseVector> gradients_beside(MultiViewObjective& objective,
   gradients.reserve(scores.size());
   for (const TileScores& view : scores) gradients.push_back(sum_of(view));
   return gradients;
+}
+
+/// Of the projected motion along a direction of the basis.
+double step_mm(const PoseVector& direction) {
+  const double turn_rad = direction.head<3>().norm();
+  const double move_mm = direction.tail<3>().norm();
+  return std::min({kInformationStepMm,
+                   kLargestInformationTurnRad / turn_rad,
+                   kLongestInformationMoveMm / move_mm});
 }
 
 }  // namespace
@@ -59,11 +70,12 @@ std::optional<PoseInformation> information_at(MultiViewObjective& objective,
   }
   information.view_curvatures.assign(here.size(), PoseMatrix::Zero());
   for (int k = 0; k < 6; ++k) {
-    const PoseVector motion = kInformationStepMm * basis.col(k);
+    const double step = step_mm(basis.col(k));
+    const PoseVector motion = step * basis.col(k);
     std::vector<PoseVector> ahead = gradients_beside(objective, frame, motion);
     std::vector<PoseVector> behind = gradients_beside(objective, frame, -motion);
     if (ahead.empty() && behind.empty()) return std::nullopt;
-    const double way = (ahead.empty() || behind.empty() ? 1.0 : 2.0) * kInformationStepMm;
+    const double way = (ahead.empty() || behind.empty() ? 1.0 : 2.0) * step;
     if (ahead.empty()) ahead = center;
     if (behind.empty()) behind = center;
     for (std::size_t view = 0; view < center.size(); ++view)

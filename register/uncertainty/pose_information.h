@@ -20,8 +20,8 @@ struct PoseInformation {
 };
 
 /// The information at the origin of `frame`. Curvature by central differences of the gradient over
-/// kInformationStepMm of projected motion (`basis`, of projected_motion_basis()) to both sides, or
-/// to one where the other is inadmissible; 13 evaluations. nullopt where neither is admissible. The
+/// kInformationStepMm of projected motion (`basis`, of projected_motion_basis()) to both sides, less
+/// where that would be far, or to one where the other is inadmissible; 13 evaluations. nullopt where neither is admissible. The
 /// measures must have derivatives. Along the room's axes instead, depth would be the difference of
 /// motions that X-rays show a thousand times better, where there is one view.
 /// \test PoseInformation.OfAQuadraticObjectiveIsItsHessian
@@ -32,6 +32,11 @@ std::optional<PoseInformation> information_at(MultiViewObjective& objective,
 
 /// Long enough to average over a field's nodes, short beside the way over which curvatures change.
 inline constexpr double kInformationStepMm = 0.2;
+
+/// Motions that hardly move projections, as depth does with one view of a small object, stay as
+/// small as this.
+inline constexpr double kLongestInformationMoveMm = 8.0;
+inline constexpr double kLargestInformationTurnRad = 0.05;
 
 /// Curvatures below this share of the largest, per squared projected motion, are raised to it:
 /// differences cannot tell them from zero or from an upward bend.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "register/uncertainty/uncertainty_estimator.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -18,8 +19,10 @@ namespace {
 constexpr int kTiles = 8;
 
 /// The stage as the curvature needs it: with derivatives, and with an optimiser that they suit.
+/// Robust gradients are of no use within silhouettes (see PoseExaminer).
 StageOptions differentiable(StageOptions stage) {
-  if (!similarity_has_derivative(stage.similarity.name)) stage.similarity.name = "rg";
+  if (!similarity_has_derivative(stage.similarity.name))
+    stage.similarity.name = stage.silhouette_mm > 0.0 ? "gc" : "rg";
   stage.similarity.has_smooth_histogram = true;
   stage.optimizer = "gradient";
   return stage;
@@ -81,6 +84,12 @@ double UncertaintyEstimator::add_covariance(const RegistrationResult& result,
                                             problem_->isocenter_point);
   if (!basis.has_value()) return UncertaintyReport::kNone;
   const std::size_t stage = stage_of_chain_.at(result.chain);
+  // Values over the region say nothing of what silhouettes show, and the other way round.
+  const bool in_silhouette = ends_->options().chains.front().stages[stage].silhouette_mm > 0.0;
+  const auto is_of_the_stage = [&](const ViewValue& value) {
+    return value.in_silhouette == in_silhouette;
+  };
+  if (!std::ranges::all_of(view_values, is_of_the_stage)) return UncertaintyReport::kNone;
   MultiViewObjective* const objective = ends_->objective_at(result.room_from_ct, stage);
   if (objective == nullptr) return UncertaintyReport::kNone;
   const auto information = information_at(*objective, frame, *basis, kTiles);

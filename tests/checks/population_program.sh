@@ -73,7 +73,7 @@ grep -q '^constexpr Confidence kOverRegions{' fitted || fail "uncertainty.py fit
 prefix/libexec/attenuation-fields/jobs/bones.sh --output bones --bones 1 --intervals 3 --ranks 2 >out 2>err || fail "bones.sh: $(cat out err)"
 grep -q '^clean-2-bone,all,1,3,' bones/tables/population.csv || fail "bones.sh wrote $(cat bones/tables/population.csv)"
 prefix/libexec/attenuation-fields/jobs/uncertainty.py bones --presets bone --variants clean >fitted 2>err || fail "uncertainty.py: $(cat err)"
-grep -q '^constexpr Confidence kInSilhouettes{' fitted || fail "uncertainty.py fitted $(cat fitted)"
+grep -q '^    InflationRow{"gc", true, ' fitted && grep -q '^constexpr Confidence kInSilhouettes{' fitted || fail "uncertainty.py fitted $(cat fitted)"
 python3 - "$root/register/uncertainty/calibration.cpp" kOverRegions pop/runs/clean-2-fast/spine-001/registrations.csv \
   kInSilhouettes bones/runs/clean-2-bone/bone-001/registrations.csv <<'PYTHON' || fail "uncertainty.py differs from calibration.cpp"
 import csv, re, sys
@@ -82,7 +82,8 @@ import uncertainty
 text = open(sys.argv[1], encoding="utf-8").read()
 for name, path in zip(sys.argv[2::2], sys.argv[3::2]):
     constants = [float(number) for number in re.search(name + r"\{([-0-9., ]+)\};", text)[1].split(",")]
-    rows = [uncertainty.Row("gc", "clean", 2, cells) for cells in csv.DictReader(open(path, encoding="utf-8"))]
+    measure = "gc in silhouettes" if name == "kInSilhouettes" else "gc"
+    rows = [uncertainty.Row(measure, "clean", 2, cells) for cells in csv.DictReader(open(path, encoding="utf-8"))]
     stated = [row for row in rows if row.has_confidence and row.stated_confidence != 0.0]
     assert stated, "no row states a confidence"
     for row in stated:
@@ -91,7 +92,9 @@ for name, path in zip(sys.argv[2::2], sys.argv[3::2]):
 PYTHON
 refuse 2 "must be some of robust, fast, paper, bone" "${uncertainty[@]}" --presets leg pop
 refuse 2 "give bone alone" "${uncertainty[@]}" --presets bone,fast pop
-refuse 4 'holds no finished run of clean-1-robust' "${uncertainty[@]}" --presets robust --views 1 pop
+refuse 2 'needs --judge' "${uncertainty[@]}" --views 1 pop
+"${uncertainty[@]}" pop --judge --views 1 >out 2>err || fail "uncertainty.py of one view: $(cat out err)"
+grep -q '^measure gc  half all, as stated' out || fail "uncertainty.py of one view wrote $(cat out)"
 refuse 4 'holds no finished run of clean-2-fast' "${uncertainty[@]}" missing
 refuse 4 'has the same patient, too' "${uncertainty[@]}" pop pop
 refuse 4 'its folder is missing' "${uncertainty[@]}" pop --judge --csv nowhere/uncertainty.csv

@@ -102,7 +102,11 @@ TEST(ProjectedMotionBasis, MakesMotionsOfOneMillimetre) {
     };
     for (int i = 0; i < 6; ++i) EXPECT_NEAR(measured_mm(PoseVector::Unit(i)), 1.0, kSecondOrder);
     // Independently of each other.
-    EXPECT_NEAR(measured_mm(PoseVector::Ones()), std::sqrt(6.0), std::sqrt(6.0) * kSecondOrder);
+    for (int i = 0; i < 6; ++i)
+      for (int j = 0; j < i; ++j)
+        EXPECT_NEAR(measured_mm(PoseVector::Unit(i) + PoseVector::Unit(j)),
+                    std::sqrt(2.0),
+                    std::sqrt(2.0) * kSecondOrder);
     double longest_mm = 0.0;
     for (int i = 0; i < 6; ++i) longest_mm = std::max(longest_mm, basis->col(i).tail<3>().norm());
     if (view_count == 1)
@@ -110,6 +114,17 @@ TEST(ProjectedMotionBasis, MakesMotionsOfOneMillimetre) {
     else
       EXPECT_LT(longest_mm, 3.0);
   }
+}
+
+TEST(ProjectedMotionBasis, OfAPointIsFiniteAndOfNoneUndefined) {
+  const std::vector<Eigen::Vector3d> points = {Eigen::Vector3d::Zero()};
+  const std::vector<View> views = {View::whole_detector(test::small_camera(false))};
+  const auto basis = projected_motion_basis(
+      RigidTransform::Identity(), Eigen::Vector3d::Zero(), points, views, Eigen::Vector3d::Zero());
+  ASSERT_TRUE(basis.has_value());
+  EXPECT_TRUE(basis->allFinite());
+  EXPECT_FALSE(
+      projected_motion_basis(some_pose(), center_ct(), {}, views, Eigen::Vector3d::Zero()));
 }
 
 TEST(ParameterScaling, OneScaledUnitMovesProjectionsByOneMillimetre) {

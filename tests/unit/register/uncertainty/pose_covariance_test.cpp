@@ -175,8 +175,29 @@ TEST(Calibration, WidensWhatThePoseDoesNotExplain) {
       last = inflation;
     }
   }
+  const std::vector<ViewValue> bone{{0.8, 0.9, true}, {0.8, 0.9, true}};
+  const std::vector<ViewValue> hidden_bone{{0.4, 0.3, true}, {0.4, 0.3, true}};
+  EXPECT_GT(covariance_inflation("gc", bone).pose, 1.0);
+  EXPECT_GT(covariance_inflation("gc", hidden_bone).pose, covariance_inflation("gc", bone).pose);
+  // Over silhouettes no other measure was fitted.
+  EXPECT_EQ(covariance_inflation("rg", bone).pose, covariance_inflation("ssd", bone).pose);
   EXPECT_TRUE(std::isnan(covariance_inflation("rg", {}).pose));
   EXPECT_TRUE(std::isnan(covariance_inflation("rg", {}).tre));
+}
+
+TEST(Calibration, ConfidenceWithinSilhouettesFallsWithEveryDoubt) {
+  const auto confidence = [](double fine_a, double fine_b, double tre_mm) {
+    const std::vector<ViewValue> values = {{0.8, fine_a, true, 0.05}, {0.8, fine_b, true, 0.05}};
+    return success_confidence({values, tre_mm});
+  };
+  // As drawn bones end, and those of a real wrist (docs/howto/bones.md).
+  EXPECT_GT(confidence(0.80, 0.75, 0.2), 0.99);
+  EXPECT_GT(confidence(0.42, 0.44, 0.1), 0.9);
+  EXPECT_LT(confidence(0.80, 0.75, 2.0), 0.5);
+  EXPECT_LT(confidence(0.60, 0.55, 0.2), confidence(0.80, 0.75, 0.2));
+  // One view shows nothing of the bone.
+  for (const double tre_mm : {1e-6, 0.1, 1.0}) EXPECT_LT(confidence(0.80, 0.05, tre_mm), 0.05);
+  EXPECT_TRUE(std::isnan(confidence(std::nan(""), std::nan(""), 0.1)));
 }
 
 TEST(Calibration, ConfidenceFallsWithEveryDoubt) {

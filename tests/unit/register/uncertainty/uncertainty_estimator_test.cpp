@@ -8,6 +8,8 @@
 #include <random>
 #include <vector>
 
+#include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <gtest/gtest.h>
 
 #include "register/method/presets.h"
@@ -123,6 +125,14 @@ TEST(BentCurvature, KeepsDirectionsThatAreKnown) {
   const PoseMatrix bent = bent_curvature(sizes.asDiagonal(), PoseMatrix::Identity());
   sizes[5] = kLeastRelativeCurvature * 100;
   EXPECT_TRUE(bent.isApprox(PoseMatrix(sizes.asDiagonal()), 1e-12));
+  // The same matrix in other parameters.
+  PoseMatrix basis = PoseMatrix::Identity();
+  basis(0, 3) = 2.0;
+  basis(5, 1) = -0.5;
+  const PoseMatrix back = basis.inverse();
+  sizes[5] = -3;
+  const PoseMatrix skew = bent_curvature(back.transpose() * sizes.asDiagonal() * back, basis);
+  EXPECT_TRUE(skew.isApprox(back.transpose() * bent * back, 1e-12));
   EXPECT_TRUE(bent_curvature(-PoseMatrix::Identity(), PoseMatrix::Identity()).isZero());
 }
 
@@ -168,6 +178,48 @@ TEST(UncertaintyEstimator, ForetellsTheSpreadOfNoisyXrays) {
     EXPECT_GT(predicted(k, k) / spread(k, k), 0.25) << k;
     EXPECT_LT(predicted(k, k) / spread(k, k), 4.0) << k;
   }
+}
+
+TEST(UncertaintyEstimator, ForetellsHowLittleOneViewShowsOfDepth) {
+  test::SmallCase small = test::small_case();
+  small.problem->views.resize(1);
+  RegistrationView& view = small.problem->views.front();
+  // Seen obliquely, so that no axis of the room is the beam.
+  const Eigen::AngleAxisd turn(0.7, Eigen::Vector3d(0.3, 0.2, 1.0).normalized());
+  CameraGeometry& camera = view.view.camera;
+  for (Eigen::Vector3d* vector : {&camera.source_point,
+                                  &camera.detector_origin_point,
+                                  &camera.column_direction,
+                                  &camera.row_direction})
+    *vector = turn * *vector;
+  view.xray = render_image(*view.renderer, small.gold_room_from_ct, View::whole_detector(camera));
+  const Eigen::Vector3d beam = camera.column_direction.cross(camera.row_direction).normalized();
+  const Image2d clean = view.xray;
+  const PoseFrame frame = PoseFrame::about(small.gold_room_from_ct, small.problem->center_ct_mm);
+  std::mt19937_64 random(19);
+  std::normal_distribution<float> noise(0.0f, 0.02f);
+  constexpr int kRepeats = 40;
+  double depth_variance = 0.0, predicted_depth_variance = 0.0, predicted_variance_across = 0.0;
+  for (int repeat = 0; repeat < kRepeats; ++repeat) {
+    const auto problem = std::make_shared<RegistrationProblem>(*small.problem);
+    for (float& value : problem->views.front().xray.pixels) value += noise(random);
+    const RegistrationResult result =
+        RegistrationRunner(problem, squares()).run(small.gold_room_from_ct);
+    const UncertaintyReport report =
+        UncertaintyEstimator(problem, squares(), {}).report(result, std::vector<ViewValue>{{1, 1}});
+    ASSERT_TRUE(std::isfinite(report.covariance_deg_mm[0]));
+    const Eigen::Matrix3d covariance =
+        from_deg_mm(report.covariance_deg_mm).bottomRightCorner<3, 3>() / report.inflation;
+    const Eigen::Vector3d error = parameters_from_pose(frame, result.room_from_ct).translation_mm;
+    depth_variance += std::pow(beam.dot(error), 2) / kRepeats;
+    predicted_depth_variance += beam.dot(covariance * beam) / kRepeats;
+    predicted_variance_across +=
+        camera.row_direction.dot(covariance * camera.row_direction) / kRepeats;
+  }
+  EXPECT_GT(predicted_depth_variance, 100.0 * predicted_variance_across);
+  // As with two views above.
+  EXPECT_GT(predicted_depth_variance / depth_variance, 0.25);
+  EXPECT_LT(predicted_depth_variance / depth_variance, 4.0);
 }
 
 TEST(UncertaintyEstimator, SaysNothingWithoutAnEnd) {
@@ -249,11 +301,14 @@ TEST(UncertaintyEstimator, SaysNothingWhereNoViewCanBeJudged) {
 }
 
 /// What is said of the gold pose by gradient correlation; `silhouette_mm`: 0 for the whole region.
-UncertaintyReport report_at_gold(const test::SmallCase& small, double silhouette_mm) {
+UncertaintyReport report_at_gold(const test::SmallCase& small,
+                                 double silhouette_mm,
+                                 int pixel_step = 1) {
   RegistrationOptions options = squares();
   StageOptions& stage = options.chains.front().stages.front();
   stage.similarity.name = "gc";
   stage.silhouette_mm = silhouette_mm;
+  stage.pixel_step = pixel_step;
   RegistrationResult result;
   result.room_from_ct = small.gold_room_from_ct;
   result.similarity = 1.0;
@@ -300,14 +355,32 @@ TEST(UncertaintyEstimator, LooksWithinSilhouettesWhereTheStageDoes) {
   ASSERT_GT(within.covariance_deg_mm[0], 0.0);
   EXPECT_TRUE(std::isfinite(within.confidence));
   EXPECT_EQ(report_at_gold(striped, kMarginMm).covariance_deg_mm, within.covariance_deg_mm);
-  EXPECT_NE(report_at_gold(striped, 0.0).covariance_deg_mm,
-            report_at_gold(small, 0.0).covariance_deg_mm);
+  const UncertaintyReport over_region = report_at_gold(small, 0.0);
+  const UncertaintyReport over_stripes = report_at_gold(striped, 0.0);
+  ASSERT_GT(over_region.covariance_deg_mm[0], 0.0);
+  ASSERT_GT(over_stripes.covariance_deg_mm[0], 0.0);
+  EXPECT_NE(over_stripes.covariance_deg_mm, over_region.covariance_deg_mm);
 }
 
-TEST(UncertaintyEstimator, SaysNothingWhereNoSilhouetteIsSeen) {
-  test::SmallCase small = test::small_case(test::bones_in_a_corner());
-  small.gold_room_from_ct.pretranslate(Eigen::Vector3d(0.0, 0.0, 300.0));
-  EXPECT_TRUE(std::isnan(report_at_gold(small, 5.0).covariance_deg_mm[0]));
+TEST(UncertaintyEstimator, SaysNothingWhereTooLittleOfTheSilhouetteIsSeen) {
+  const test::SmallCase small = test::small_case(test::bones_in_a_corner());
+  // 6 x 6 pixels a view are enough for a region, not for a silhouette.
+  EXPECT_TRUE(std::isfinite(report_at_gold(small, 0.0, 6).covariance_deg_mm[0]));
+  EXPECT_TRUE(std::isnan(report_at_gold(small, 5.0, 6).covariance_deg_mm[0]));
+}
+
+TEST(UncertaintyEstimator, SaysNothingByValuesOfAnotherKindThanItsStage) {
+  const test::SmallCase small = test::small_case(test::bones_in_a_corner());
+  RegistrationOptions options = squares();
+  RegistrationResult result;
+  result.room_from_ct = small.gold_room_from_ct;
+  result.similarity = 1.0;
+  result.chain = "squares";
+  UncertaintyEstimator estimator(small.problem, options, {});
+  const std::vector<ViewValue> of_region{{0.8, 0.8, false, 0.1}};
+  const std::vector<ViewValue> in_silhouettes{{0.8, 0.8, true, 0.1}};
+  EXPECT_TRUE(std::isfinite(estimator.report(result, of_region).covariance_deg_mm[0]));
+  EXPECT_TRUE(std::isnan(estimator.report(result, in_silhouettes).covariance_deg_mm[0]));
 }
 
 TEST(UncertaintyEstimator, IsSilentWhereTheMeasureThatStandsInRefusesTheXray) {
