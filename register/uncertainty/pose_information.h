@@ -20,11 +20,11 @@ struct PoseInformation {
 };
 
 /// The information at the origin of `frame`. Curvature by central differences of the gradient over
-/// kInformationStepMm of projected motion (`basis`, of projected_motion_basis()) to both sides, less
-/// where that would be far, or to one where the other is inadmissible; 13 evaluations. nullopt where neither is admissible. The
-/// measures must have derivatives. Along the room's axes instead, depth would be the difference of
-/// motions that X-rays show a thousand times better, where there is one view.
-/// \test PoseInformation.OfAQuadraticObjectiveIsItsHessian
+/// kInformationStepMm of projected motion (`basis`, of projected_motion_basis()) to both sides,
+/// less where that would be far, or to one where the other is inadmissible; 13 evaluations. nullopt
+/// where neither is admissible. The measures must have derivatives. Along the room's axes instead,
+/// depth would be the difference of motions that X-rays show a thousand times better, where there
+/// is one view. \test PoseInformation.OfAQuadraticObjectiveIsItsHessian
 std::optional<PoseInformation> information_at(MultiViewObjective& objective,
                                               const PoseFrame& frame,
                                               const PoseMatrix& basis,

@@ -73,7 +73,9 @@ grep -q '^constexpr Confidence kOverRegions{' fitted || fail "uncertainty.py fit
 prefix/libexec/attenuation-fields/jobs/bones.sh --output bones --bones 1 --intervals 3 --ranks 2 >out 2>err || fail "bones.sh: $(cat out err)"
 grep -q '^clean-2-bone,all,1,3,' bones/tables/population.csv || fail "bones.sh wrote $(cat bones/tables/population.csv)"
 prefix/libexec/attenuation-fields/jobs/uncertainty.py bones --presets bone --variants clean >fitted 2>err || fail "uncertainty.py: $(cat err)"
-grep -q '^    InflationRow{"gc", true, ' fitted && grep -q '^constexpr Confidence kInSilhouettes{' fitted || fail "uncertainty.py fitted $(cat fitted)"
+for line in '    InflationRow{"gc", true, ' 'constexpr Confidence kInSilhouettes{'; do
+  grep -q "^$line" fitted || fail "uncertainty.py fitted $(cat fitted)"
+done
 python3 - "$root/register/uncertainty/calibration.cpp" kOverRegions pop/runs/clean-2-fast/spine-001/registrations.csv \
   kInSilhouettes bones/runs/clean-2-bone/bone-001/registrations.csv <<'PYTHON' || fail "uncertainty.py differs from calibration.cpp"
 import csv, re, sys
