@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """X-rays of one bone among others and a study of it, for what is measured of `--preset bone` (docs/howto/bones.md): the CT holds one
 bone in air (numbers 0 to 4095), two cameras (MayaCam files) also see other bones and soft tissue. X-rays are cast through bodies of
@@ -50,7 +49,6 @@ class Grid:
     """Voxel centres in mm of the coarse voxels' frame."""
 
     def __init__(self, spacing_mm):
-        self.spacing_mm = spacing_mm
         counts = np.round(SIZE_MM / spacing_mm).astype(int)
         axes = [(np.arange(n) + 0.5) * spacing_mm - 0.5 for n in counts]
         self.z, self.y, self.x = np.meshgrid(*reversed(axes), indexing="ij")

@@ -49,7 +49,8 @@ need_programs "$bin" af-drr af-evaluate
 "$python" -c "import numpy" 2>/dev/null || die 1 "$python has no numpy: jobs/install-packages.sh installs it"
 open_output "$target"
 mkdir -p "$output"/{studies,runs}
-stages_of_any_build=yes
+# shellcheck disable=SC2034  # for stage()
+stages_of_any_build=yes stage_inputs=$(sha256sum <"$af_root/jobs/bone_scenes.py")
 
 # make_scene NAME SEED: what an interrupted one left goes first.
 make_scene() {
@@ -59,8 +60,6 @@ make_scene() {
 
 for ((number = first; number < first + bones; ++number)); do
   name=$(printf 'bone-%03d' "$number")
-  # shellcheck disable=SC2034  # for stage()
-  stage_inputs="$(sha256sum "$af_root/jobs/bone_scenes.py")"
   stage "scene $name" "$output/studies/$name/study.toml" make_scene "$name" "$number"
   stage "clean-2-bone/$name" "$output/runs/clean-2-bone/$name/summary.json" run_ranks "$ranks" "$bin/af-evaluate" registration \
     --study "$output/studies/$name/study.toml" --gold study --renderer raycast --preset bone --intervals "$intervals" \

@@ -15,10 +15,9 @@ Usage: jobs/peers.sh [OPTIONS]
 
 Simulates a phantom's X-rays, clean and stressed, and registers them from the same starts: by fields and by ray casting
 (presets), by automatic differentiation in PyTorch (evaluate/peers/autodiff_registration.py) and by plastimatch's DRRs
-with two optimisers of af-register, nelder-mead and bobyqa (evaluate/peers/plastimatch_registration.py). Says what
-Debian's elastix answers to its ray-casting interpolator. Writes peers.csv. After a stop, run the same command again to
-continue. Needs the programs in build/release/bin; peers that are not installed (jobs/install-packages.sh --with-peers)
-are left out, and it says so.
+with af-register's nelder-mead (evaluate/peers/plastimatch_registration.py). Says what Debian's elastix answers to its
+ray-casting interpolator. Writes peers.csv. After a stop, run the same command again to continue. Needs the programs in
+build/release/bin; peers that are not installed (jobs/install-packages.sh --with-peers) are left out, and it says so.
 
   --output DIR             where everything goes                                                             [./peers]
   --kind KIND              phantom: spine, pelvis or head                                                      [spine]
@@ -85,13 +84,12 @@ evaluate() {
     --intervals "$intervals" --seed "$seed" -o "$output/runs/$name" "$@"
 }
 
-# peer NAME CASE SCRIPT STARTS [OPTIONS...]: another program's poses, judged by our errors.
+# peer NAME CASE SCRIPT STARTS: another program's poses, judged by our errors.
 peer() {
   local name=$1 case_name=$2 script=$3 most=$4 poses="$output/poses/$2-$1.csv"
-  shift 4
   stage "$case_name-$name-poses" "$poses" "$python" "$af_root/evaluate/peers/$script" \
     --study "$output/studies/$case_name/study.toml" --case "$kind" --starts "$output/starts/$case_name/starts.csv" \
-    --most "$most" "$@" -o "$poses"
+    --most "$most" -o "$poses"
   local stage_inputs
   # shellcheck disable=SC2034  # for stage()
   stage_inputs="$(state_of "$poses")"
@@ -125,9 +123,7 @@ for variant in clean stressed; do
     say "automatic differentiation: left out, $python has no torch"
   fi
   if command -v plastimatch >/dev/null && has_python numpy,nlopt; then
-    for optimizer in nelder-mead bobyqa; do
-      peer "plastimatch-$optimizer" "$case_name" plastimatch_registration.py "$plastimatch_starts" --optimizer "$optimizer"
-    done
+    peer plastimatch-nelder-mead "$case_name" plastimatch_registration.py "$plastimatch_starts"
   else
     say "plastimatch: left out, it or python3-nlopt is not installed"
   fi

@@ -10,7 +10,7 @@ import statistics
 import sys
 
 SUCCESS_TRE_MM = 2.5
-METHODS = ("robust", "fast", "paper", "autodiff", "plastimatch-nelder-mead", "plastimatch-bobyqa")
+METHODS = ("robust", "fast", "paper", "autodiff", "plastimatch-nelder-mead")
 
 
 def numbers(rows, column):

@@ -1,11 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Registration with the DRRs of plastimatch (`plastimatch drr`, a process per DRR) and an optimiser of af-register's that
-needs no derivatives: NLopt's, called as register/optimizer/nlopt_search.cpp does. It maximises the sum of the views'
-correlations of gradients. Needs plastimatch, numpy and nlopt (Debian's python3-nlopt).
+"""Registration with the DRRs of plastimatch (`plastimatch drr`, a process per DRR) and af-register's nelder-mead, which is
+NLopt's, called as register/optimizer/nlopt_search.cpp does. It maximises the sum of the views' correlations of gradients. Needs plastimatch, numpy and nlopt (Debian's python3-nlopt).
 
     python3 evaluate/peers/plastimatch_registration.py --study study.toml --case NAME --starts starts.csv -o poses.csv
 """
-import contextlib
 import pathlib
 import subprocess
 import tempfile
@@ -17,7 +15,6 @@ from peer_case import PeerCase, moved, options_of, run
 
 FACTOR = 4  # pixels so many times as wide
 MOST_POSES = 220
-OPTIMIZERS = {"nelder-mead": nlopt.LN_NELDERMEAD, "bobyqa": nlopt.LN_BOBYQA}
 FIRST_STEPS = np.array([0.06, 0.06, 0.06, 5.0, 5.0, 5.0])  # rad, mm
 FINAL_STEP = 0.02  # of the first ones, so 0.1 mm
 
@@ -86,31 +83,18 @@ def gradient_correlation(a, b):
     return 0.5 * total
 
 
-def best_of(optimizer, value):
+def best_of(value):
     """The scaled parameters where value(parameters) was highest, searched from 0."""
-    best = (-np.inf, np.zeros(6))
-
-    def seen(scaled, _):
-        nonlocal best
-        now = value(scaled)
-        if now > best[0]:
-            best = (now, scaled.copy())
-        return now
-
-    search = nlopt.opt(OPTIMIZERS[optimizer], 6)
-    search.set_max_objective(seen)
+    search = nlopt.opt(nlopt.LN_NELDERMEAD, 6)
+    search.set_max_objective(lambda scaled, _: value(scaled))
     search.set_initial_step(1.0)
     search.set_xtol_abs(FINAL_STEP)
     search.set_maxeval(MOST_POSES)
-    with contextlib.suppress(nlopt.RoundoffLimited):  # where rounding stopped BOBYQA's steps
-        search.optimize(np.zeros(6))
-    return best[1]
+    return search.optimize(np.zeros(6))
 
 
 def main():
-    parser = options_of(__doc__)
-    parser.add_argument("--optimizer", choices=OPTIMIZERS, default="nelder-mead", help="of af-register's [nelder-mead]")
-    options = parser.parse_args()
+    options = options_of(__doc__).parse_args()
     case = PeerCase(options.study, options.case)
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
@@ -125,7 +109,7 @@ def main():
                 pose = pose_of(scaled)
                 return sum(gradient_correlation(p(pose), p.xray) for p in projectors)
 
-            return pose_of(best_of(options.optimizer, value))
+            return pose_of(best_of(value))
 
         run(options, register)
 

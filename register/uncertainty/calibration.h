@@ -33,7 +33,8 @@ struct ConfidenceFeatures {
 /// values within silhouettes its logarithm, and on the logarithm of the predicted TRE. NaN where
 /// there is no excess. A view that cannot be judged does not count. \test
 /// Calibration.ConfidenceFallsWithEveryDoubt \test
-/// Calibration.AViewThatShowsNothingLeavesLittleConfidence
+/// Calibration.AViewThatShowsNothingLeavesLittleConfidence \test
+/// Calibration.ConfidenceWithinSilhouettesFallsWithEveryDoubt
 double success_confidence(const ConfidenceFeatures& features);
 
 }  // namespace af::registration

@@ -25,7 +25,8 @@ struct UncertaintyOptions {
 /// covariance of the stage that it ended with, what the cameras' calibration adds, widened by a
 /// factor calibrated on measured registrations, the resulting TRE, and the confidence that it
 /// succeeded. Where the stage's measure has no derivative (tncc, gd, pi, entropy, go), rg stands
-/// for it. For one thread at a time. \test UncertaintyEstimator.ForetellsTheSpreadOfNoisyXrays
+/// for it, within silhouettes gc. For one thread at a time. \test
+/// UncertaintyEstimator.ForetellsTheSpreadOfNoisyXrays
 class UncertaintyEstimator {
  public:
   /// `problem` and `method`: as for the RegistrationRunner of the results. Reports stay empty when
@@ -39,8 +40,9 @@ class UncertaintyEstimator {
   [[nodiscard]] bool is_on() const { return ends_ != nullptr; }
 
   /// `view_values`: of PoseExaminer, with backgrounds, at the result's end. Covariance and TREs are
-  /// NaN when there is no end, or when some motion from it is admissible to neither side; the
-  /// confidence is 0 when nothing was found.
+  /// NaN when there is no end, when some motion from it is admissible to neither side, when too
+  /// little of a silhouette is visible, and when values within silhouettes are of a stage that
+  /// looks at the region, or the other way round; the confidence is 0 when nothing was found.
   [[nodiscard]] UncertaintyReport report(const RegistrationResult& result,
                                          std::span<const ViewValue> view_values);
 
