@@ -211,7 +211,7 @@ TracedRow traced_row(Method& method,
       });
   row.renderer = method.renderer;
   row.start_index = index;
-  if (!row.is_success(method.success_tre_mm))
+  if (!row.is_right(method.success_tre_mm))
     traced.trace = trace_points(result.trace, method.runner.problem().frame(), yardstick);
   return traced;
 }

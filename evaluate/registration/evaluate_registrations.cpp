@@ -259,7 +259,9 @@ json summary_json(const RegistrationStudyOptions& options,
       found.push_back(text);
   }
   summary["row_problems"] = found;
-  summary["warnings"] = warnings_about_cases(evaluations.size());
+  std::vector<std::string> case_names;
+  for (const CaseEvaluation& evaluation : evaluations) case_names.push_back(evaluation.case_name);
+  summary["warnings"] = warnings_about_patients(patient_count(case_names));
   for (const CaseEvaluation& evaluation : evaluations)
     for (const std::string& text : warnings_about_starts(options, evaluation))
       summary["warnings"].push_back(text);

@@ -28,7 +28,10 @@ struct MethodRow {
   double rotation_bias_deg = 0.0;    ///< length of the mean signed rotation
   double translation_bias_mm = 0.0;  ///< length of the mean signed translation
   double median_rotation_error_deg = 0.0;
-  std::int64_t gross_failures = 0;  ///< of all starts: 10 mm or more, or no pose
+  std::int64_t gross_failures = 0;  ///< of all starts: a TRE of 10 mm or more, or no pose
+  /// Of all starts, an mRPD below the threshold: to be read with one view, which shows no depth.
+  std::int64_t mrpd_successes = 0;
+  double median_mrpd_mm = 0.0;  ///< of these
   /// The case's own capture range as text, "at least 16" where the study ends first; "-" where the
   /// run's summary does not have it.
   std::string capture_range_mm = "-";

@@ -12,6 +12,7 @@
 #include "evaluate/outputs/sample_summary_json.h"
 #include "evaluate/registration/case_intervals.h"
 #include "evaluate/statistics/case_equivalence.h"
+#include "evaluate/statistics/patient_names.h"
 #include "evaluate/statistics/signed_rank_test.h"
 #include "evaluate/statistics/statistics.h"
 
@@ -81,8 +82,8 @@ json test_json(const std::vector<double>& field_tre_mm,
           {"pairs_for_power_90", pairs_for_equivalence(sd, margin_mm)}};
 }
 
-/// Sums over the pairs of one case.
-struct CasePairs {
+/// Sums over the pairs of one patient.
+struct PatientPairs {
   CaseMean tre_difference_mm;   ///< field less ray casting, where both succeeded
   CaseMean success_difference;  ///< field less ray casting, every common start
   CaseMean end_distance_mm;     ///< where both succeeded
@@ -97,41 +98,41 @@ struct PairSums {
   std::vector<double> all_distances_mm;  ///< where both have an end pose
   std::int64_t only_field = 0;
   std::int64_t only_raycast = 0;
-  std::map<std::string, CasePairs> cases;
+  std::map<std::string, PatientPairs> patients;
 
   void add(const StartPair& pair, const PairedOptions& options);
 };
 
 void PairSums::add(const StartPair& pair, const PairedOptions& options) {
-  CasePairs& of_case = cases[pair.field->case_name];
+  PatientPairs& of_patient = patients[patient_of_case(pair.field->case_name)];
   seconds[0].push_back(pair.field->seconds);
   seconds[1].push_back(pair.raycast->seconds);
-  const bool field = pair.field->is_success(options.success_tre_mm);
-  const bool raycast = pair.raycast->is_success(options.success_tre_mm);
+  const bool field = pair.field->is_right(options.success_tre_mm);
+  const bool raycast = pair.raycast->is_right(options.success_tre_mm);
   only_field += field && !raycast ? 1 : 0;
   only_raycast += raycast && !field ? 1 : 0;
-  of_case.success_difference.sum += (field ? 1.0 : 0.0) - (raycast ? 1.0 : 0.0);
-  of_case.success_difference.count += 1.0;
+  of_patient.success_difference.sum += (field ? 1.0 : 0.0) - (raycast ? 1.0 : 0.0);
+  of_patient.success_difference.count += 1.0;
   const double distance_mm =
       options.end_distance_mm ? options.end_distance_mm(*pair.field, *pair.raycast) : kNan;
   if (std::isfinite(distance_mm)) all_distances_mm.push_back(distance_mm);
   if (!field || !raycast) return;
   field_tre_mm.push_back(pair.field->tre_mm);
   raycast_tre_mm.push_back(pair.raycast->tre_mm);
-  of_case.tre_difference_mm.sum += pair.field->tre_mm - pair.raycast->tre_mm;
-  of_case.tre_difference_mm.count += 1.0;
+  of_patient.tre_difference_mm.sum += pair.field->tre_mm - pair.raycast->tre_mm;
+  of_patient.tre_difference_mm.count += 1.0;
   if (!std::isfinite(distance_mm)) return;
   distances_mm.push_back(distance_mm);
-  of_case.end_distance_mm.sum += distance_mm;
-  of_case.end_distance_mm.count += 1.0;
+  of_patient.end_distance_mm.sum += distance_mm;
+  of_patient.end_distance_mm.count += 1.0;
 }
 
-/// One of the means of every case that has it.
-std::vector<CaseMean> means_of(const std::map<std::string, CasePairs>& cases,
-                               CaseMean CasePairs::*member) {
+/// One of the means of every patient that has it.
+std::vector<CaseMean> means_of(const std::map<std::string, PatientPairs>& patients,
+                               CaseMean PatientPairs::*member) {
   std::vector<CaseMean> means;
-  for (const auto& [name, of_case] : cases)
-    if ((of_case.*member).count > 0.0) means.push_back(of_case.*member);
+  for (const auto& [name, of_patient] : patients)
+    if ((of_patient.*member).count > 0.0) means.push_back(of_patient.*member);
   return means;
 }
 
@@ -139,11 +140,11 @@ std::vector<CaseMean> means_of(const std::map<std::string, CasePairs>& cases,
 /// where both do: the difference of success rates must be shown to be small, too.
 constexpr double kSuccessMargin = 0.05;
 
-/// Whether both 95 % intervals over cases of the success difference lie within the margin.
-/// Student's has no ends where all cases are alike; the bootstrap's then are their common value.
+/// Whether both 95 % intervals over patients of the success difference lie within the margin.
+/// Student's has no ends where all patients are alike; the bootstrap's then are their common value.
 bool succeeds_alike(const PairSums& sums, std::uint64_t seed) {
   const json interval =
-      interval_over_cases(means_of(sums.cases, &CasePairs::success_difference), seed);
+      interval_over_cases(means_of(sums.patients, &PatientPairs::success_difference), seed);
   const auto is_small = [&](const char* end) {
     return interval[end].is_number() && std::abs(interval[end].get<double>()) <= kSuccessMargin;
   };
@@ -152,15 +153,15 @@ bool succeeds_alike(const PairSums& sums, std::uint64_t seed) {
          (!has_spread || (is_small("student_low") && is_small("student_high")));
 }
 
-/// Every case counts alike, however many pairs it has.
+/// Every patient counts alike, however many pairs it has.
 json end_distance_json(const PairSums& sums, const PairedOptions& options) {
-  std::vector<double> case_means_mm;
-  for (const CaseMean& mean : means_of(sums.cases, &CasePairs::end_distance_mm))
-    case_means_mm.push_back(mean.sum / mean.count);
+  std::vector<double> patient_means_mm;
+  for (const CaseMean& mean : means_of(sums.patients, &PatientPairs::end_distance_mm))
+    patient_means_mm.push_back(mean.sum / mean.count);
   const CaseEquivalence found =
-      equivalence_over_cases(case_means_mm, options.margin_mm, options.seed);
-  const auto cases_without_pairs =
-      static_cast<std::int64_t>(sums.cases.size() - case_means_mm.size());
+      equivalence_over_cases(patient_means_mm, options.margin_mm, options.seed);
+  const auto patients_without_pairs =
+      static_cast<std::int64_t>(sums.patients.size() - patient_means_mm.size());
   json over_cases = bootstrap_json(found.bootstrap);
   over_cases["mean"] = number_json(found.mean);
   over_cases["student_low"] = number_json(found.student.low);
@@ -171,12 +172,12 @@ json end_distance_json(const PairSums& sums, const PairedOptions& options) {
                  {"margin_mm", options.margin_mm},
                  {"p", number_json(found.p)},
                  {"cases_needed", kEnoughCasesForEquivalence},
-                 {"cases_without_pairs", cases_without_pairs},
+                 {"cases_without_pairs", patients_without_pairs},
                  {"success_margin", kSuccessMargin},
                  {"has_enough_cases", found.has_enough_cases()}};
-  // With too few cases nothing is claimed, neither way.
+  // With too few patients nothing is claimed, neither way.
   const bool is_shown =
-      found.is_shown() && cases_without_pairs == 0 && succeeds_alike(sums, options.seed);
+      found.is_shown() && patients_without_pairs == 0 && succeeds_alike(sums, options.seed);
   result["is_equivalent"] = found.has_enough_cases() ? json(is_shown) : json(nullptr);
   return result;
 }
@@ -195,12 +196,12 @@ json paired_statistics(std::span<const RegistrationRow> rows, const PairedOption
       {"median_seconds", {summarize(sums.seconds[0]).median, summarize(sums.seconds[1]).median}},
       {"pairs", both}};
   result["success_difference_over_cases"] =
-      interval_over_cases(means_of(sums.cases, &CasePairs::success_difference), options.seed);
+      interval_over_cases(means_of(sums.patients, &PatientPairs::success_difference), options.seed);
   if (options.end_distance_mm) result["end_distance_mm"] = end_distance_json(sums, options);
   if (both >= 2)
     result["test"] = test_json(sums.field_tre_mm, sums.raycast_tre_mm, options.margin_mm);
   result["mean_difference_over_cases_mm"] =
-      interval_over_cases(means_of(sums.cases, &CasePairs::tre_difference_mm), options.seed);
+      interval_over_cases(means_of(sums.patients, &PatientPairs::tre_difference_mm), options.seed);
   return result;
 }
 

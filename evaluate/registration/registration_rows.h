@@ -68,7 +68,15 @@ struct RegistrationRow {
   InternedText error;    ///< message of a registration that threw
   double seconds = 0.0;  ///< wall time
 
+  /// Of its case, and known where there is an end pose.
+  bool has_one_view = false;
+
+  /// As the column `success` has it.
   [[nodiscard]] bool is_success(double success_tre_mm) const { return tre_mm < success_tre_mm; }
+  /// Whether the end is the right place: by TRE, with one view, which shows no depth, by mRPD.
+  [[nodiscard]] bool is_right(double success_mm) const {
+    return (has_one_view ? errors.mrpd_mm : tre_mm) < success_mm;
+  }
   auto members() {
     return std::tie(case_name,
                     renderer,
@@ -93,7 +101,8 @@ struct RegistrationRow {
                     uncertainty,
                     chain_distance_mm,
                     squared_distance,
-                    seconds);
+                    seconds,
+                    has_one_view);
   }
 };
 

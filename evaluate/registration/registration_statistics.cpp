@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <set>
 #include <span>
 #include <string>
 #include <tuple>
@@ -16,6 +17,7 @@
 #include "evaluate/registration/success_statistics.h"
 #include "evaluate/registration/uncertainty_statistics.h"
 #include "evaluate/statistics/bootstrap.h"
+#include "evaluate/statistics/patient_names.h"
 
 namespace af::evaluation {
 
@@ -29,14 +31,14 @@ constexpr std::array<const char*, 5> kErrorNames = {"mrpd_mm",
                                                     "rotation_error_deg",
                                                     "translation_error_mm"};
 
-/// Mean, SD and standard error of the signed final error of each parameter over the successes: how
+/// Mean, SD and standard error of the signed final error of each parameter over right ends: how far
 /// far the optimum itself lies from the gold pose.
 json bias_json(const RowPointers& rows, double success_tre_mm) {
   json result = json::object();
   for (std::size_t i = 0; i < kParameterNames.size(); ++i) {
     std::vector<double> values;
     for (const RegistrationRow* row : rows)
-      if (row->is_success(success_tre_mm) && std::isfinite(row->final_deg_mm[i]))
+      if (row->is_right(success_tre_mm) && std::isfinite(row->final_deg_mm[i]))
         values.push_back(row->final_deg_mm[i]);
     const SampleSummary summary = summarize(values);
     result[kParameterNames[i]] = {
@@ -48,13 +50,13 @@ json bias_json(const RowPointers& rows, double success_tre_mm) {
   return result;
 }
 
-/// The errors beside TRE, over successes.
+/// The errors beside TRE, over right ends.
 json errors_json(const RowPointers& rows, double success_tre_mm) {
   json result = json::object();
   for (std::size_t i = 0; i < kErrorNames.size(); ++i) {
     std::vector<double> values;
     for (const RegistrationRow* row : rows)
-      if (row->is_success(success_tre_mm) && std::isfinite(row->errors.values()[i]))
+      if (row->is_right(success_tre_mm) && std::isfinite(row->errors.values()[i]))
         values.push_back(row->errors.values()[i]);
     result[kErrorNames[i]] = to_json(summarize(values));
   }
@@ -117,7 +119,7 @@ json statistics_of(const RowPointers& rows, const StatisticsOptions& options) {
     evaluations.push_back(static_cast<double>(row->evaluations));
     drr_counts.push_back(static_cast<double>(row->drr_count));
     ++stop_reasons[row->stop_reason];
-    if (!row->is_success(options.success_tre_mm)) ++failures[failure_reason(*row)];
+    if (!row->is_right(options.success_tre_mm)) ++failures[failure_reason(*row)];
   }
   result["stop_reasons"] = stop_reasons;
   result["failures_by_reason"] = failures;
@@ -127,12 +129,12 @@ json statistics_of(const RowPointers& rows, const StatisticsOptions& options) {
   return result;
 }
 
-/// Intervals over cases of the success rate, of the mean TRE of successes and of capture ranges.
-json over_cases_json(const std::map<std::string, RowPointers>& by_case,
-                     const StatisticsOptions& options) {
+/// Intervals over patients of the success rate, of the mean TRE of successes and of capture ranges.
+json over_patients_json(const std::map<std::string, RowPointers>& by_patient,
+                        const StatisticsOptions& options) {
   std::vector<CaseMean> rates;
   std::vector<CaseMean> successful_tre_mm;
-  for (const auto& [name, rows] : by_case) {
+  for (const auto& [name, rows] : by_patient) {
     CaseMean tre_mm;
     for (const RegistrationRow* row : rows) {
       if (!row->is_success(options.success_tre_mm)) continue;
@@ -145,7 +147,7 @@ json over_cases_json(const std::map<std::string, RowPointers>& by_case,
   json result = {
       {"rate", interval_over_cases(rates, options.seed)},
       {"mean_tre_of_successes_mm", interval_over_cases(successful_tre_mm, options.seed)}};
-  add_capture_over_cases(by_case, options, result);
+  add_capture_over_patients(by_patient, options, result);
   // Student's interval does not know that rates end at 0 and 1.
   for (const char* name : {"student_low", "student_high"})
     if (json& end = result["rate"][name]; end.is_number())
@@ -189,11 +191,13 @@ json renderer_statistics(std::span<const RegistrationRow> rows,
                          const StatisticsOptions& options) {
   RowPointers mine;
   std::map<std::string, RowPointers> by_case;
+  std::map<std::string, RowPointers> by_patient;
   std::vector<double> stated_pose_tre_mm;
   for (const RegistrationRow& row : rows) {
     if (row.renderer != renderer) continue;
     mine.push_back(&row);
     by_case[row.case_name].push_back(&row);
+    by_patient[patient_of_case(row.case_name)].push_back(&row);
     if (row.is_success(options.success_tre_mm) && std::isfinite(row.stated_pose_tre_mm))
       stated_pose_tre_mm.push_back(row.stated_pose_tre_mm);
   }
@@ -203,8 +207,8 @@ json renderer_statistics(std::span<const RegistrationRow> rows,
   std::int64_t inside = 0;
   for (const json& interval : result["intervals"]) inside += interval["starts"].get<std::int64_t>();
   result["starts_beyond_last_interval"] = static_cast<std::int64_t>(mine.size()) - inside;
-  result["over_cases"] = over_cases_json(by_case, options);
-  if (json uncertainty = uncertainty_statistics(by_case, options); !uncertainty.is_null())
+  result["over_cases"] = over_patients_json(by_patient, options);
+  if (json uncertainty = uncertainty_statistics(by_patient, options); !uncertainty.is_null())
     result["uncertainty"] = std::move(uncertainty);
   result["cases"] = json::array();
   for (const auto& [name, case_rows] : by_case) {
@@ -234,15 +238,22 @@ std::vector<std::string> row_problems(std::span<const RegistrationRow> rows) {
   return found;
 }
 
-std::vector<std::string> warnings_about_cases(std::size_t cases) {
-  if (cases >= kEnoughCases) return {};
-  if (cases < 2)
+std::size_t patient_count(std::span<const std::string> case_names) {
+  std::set<std::string> patients;
+  for (const std::string& name : case_names) patients.insert(patient_of_case(name));
+  return patients.size();
+}
+
+std::vector<std::string> warnings_about_patients(std::size_t patients) {
+  if (patients >= kEnoughCases) return {};
+  if (patients < 2)
     return {
-        "one case: its intervals hold for other starts of this patient and say nothing about "
-        "other patients"};
-  return {std::to_string(cases) + " cases: the bootstrap interval over cases is too narrow below " +
+        "one patient: intervals hold for other starts, not for other patients, and there are none "
+        "over patients"};
+  return {std::to_string(patients) +
+          " patients: the bootstrap interval over patients is too narrow below " +
           std::to_string(kEnoughCases) +
-          " cases; take Student's interval beside it (docs/errors.md)"};
+          " of them; take Student's interval beside it (docs/errors.md)"};
 }
 
 }  // namespace af::evaluation

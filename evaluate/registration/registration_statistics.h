@@ -12,8 +12,8 @@
 
 namespace af::evaluation {
 
-/// TRE at or above this, or no pose at all, is a gross failure.
-inline constexpr double kGrossFailureTreMm = 10.0;
+/// A TRE (or mRPD) at or above this, or no pose at all, is a gross failure.
+inline constexpr double kGrossFailureMm = 10.0;
 
 /// How initial TRE is divided, the seed of the bootstrap, and what a success is.
 struct StatisticsOptions {
@@ -32,7 +32,8 @@ std::string failure_reason(const RegistrationRow& row);
 /// Counts, success (overall, per interval, per threshold; by TRE and by mRPD), gross failures,
 /// failures by reason, capture ranges, TRE over all runs (no pose counts as infinitely far) and
 /// over successes, bias, the other errors, stop reasons and times of one renderer; per case, too;
-/// intervals over cases. docs/errors.md defines each.
+/// intervals over patients (`over_cases`, whose cases are those of patient_of_case()).
+/// docs/errors.md defines each. \test RegistrationStatistics.CasesOfOnePatientAreOnePatient
 nlohmann::json renderer_statistics(std::span<const RegistrationRow> rows,
                                    const std::string& renderer,
                                    const StatisticsOptions& options);
@@ -41,7 +42,10 @@ nlohmann::json renderer_statistics(std::span<const RegistrationRow> rows,
 /// beside a pose, initial TREs that are not finite. Empty when nothing is.
 std::vector<std::string> row_problems(std::span<const RegistrationRow> rows);
 
-/// Conclusions that so few cases do not allow, in words; empty when there are enough cases.
-std::vector<std::string> warnings_about_cases(std::size_t cases);
+/// Of how many patients (patient_of_case()) the cases are.
+std::size_t patient_count(std::span<const std::string> case_names);
+
+/// Conclusions that so few patients do not allow, in words; empty when there are enough.
+std::vector<std::string> warnings_about_patients(std::size_t patients);
 
 }  // namespace af::evaluation

@@ -21,15 +21,18 @@ using nlohmann::json;
 namespace {
 
 /// The ends are TREs, or mRPDs: with one view the depth along its rays stays unknown, so that a TRE
-/// says little, while a distance from the rays can be small.
-enum class EndError { Tre, Mrpd };
+/// says little, while a distance from the rays can be small; or the one of these that
+/// RegistrationRow::is_right() looks at.
+enum class EndError { Tre, Mrpd, Decisive };
 
 std::vector<TreOutcome> outcomes_by(EndError error, const RowPointers& rows) {
   std::vector<TreOutcome> outcomes;
   outcomes.reserve(rows.size());
-  for (const RegistrationRow* row : rows)
-    outcomes.push_back(
-        {row->initial_tre_mm, error == EndError::Tre ? row->tre_mm : row->errors.mrpd_mm});
+  for (const RegistrationRow* row : rows) {
+    const bool by_mrpd =
+        error == EndError::Mrpd || (error == EndError::Decisive && row->has_one_view);
+    outcomes.push_back({row->initial_tre_mm, by_mrpd ? row->errors.mrpd_mm : row->tre_mm});
+  }
   return outcomes;
 }
 
@@ -93,7 +96,9 @@ json success_statistics(const RowPointers& rows, const StatisticsOptions& option
     result["intervals"].push_back(interval_json(interval));
   result["thresholds"] = ladder_json(by_tre);
   result["gross_failures"] =
-      proportion_json(trials - count_successes(by_tre, kGrossFailureTreMm), trials);
+      proportion_json(trials - count_successes(by_tre, kGrossFailureMm), trials);
+  result["mrpd_gross_failures"] =
+      proportion_json(trials - count_successes(by_mrpd, kGrossFailureMm), trials);
   result["capture_range"] = capture_json(intervals);
   result["cumulative_capture_range"] = cumulative_capture_json(by_tre, options.success_tre_mm);
   result["mrpd_success"] = share_below(options.success_tre_mm, by_mrpd);
@@ -102,16 +107,16 @@ json success_statistics(const RowPointers& rows, const StatisticsOptions& option
   return result;
 }
 
-void add_capture_over_cases(const std::map<std::string, RowPointers>& by_case,
-                            const StatisticsOptions& options,
-                            json& over_cases) {
-  std::vector<std::vector<IntervalSuccess>> cases;
+void add_capture_over_patients(const std::map<std::string, RowPointers>& by_patient,
+                               const StatisticsOptions& options,
+                               json& over_patients) {
+  std::vector<std::vector<IntervalSuccess>> patients;
   std::vector<CaseMean> own_ranges;
   std::vector<double> ranges_mm;
   std::int64_t at_least = 0;
-  for (const auto& [name, rows] : by_case) {
-    cases.push_back(intervals_of(outcomes_by(EndError::Tre, rows), options));
-    const CaptureRange range = capture_range(cases.back());
+  for (const auto& [name, rows] : by_patient) {
+    patients.push_back(intervals_of(outcomes_by(EndError::Decisive, rows), options));
+    const CaptureRange range = capture_range(patients.back());
     own_ranges.push_back({range.initial_tre_mm, 1.0});
     ranges_mm.push_back(range.initial_tre_mm);
     at_least += range.is_whole_study() ? 1 : 0;
@@ -122,11 +127,11 @@ void add_capture_over_cases(const std::map<std::string, RowPointers>& by_case,
   own["min_mm"] = number_json(summary.minimum);
   own["max_mm"] = number_json(summary.maximum);
   own["at_least"] = at_least;
-  over_cases["capture_range_mm"] = own;
-  over_cases["pooled_capture_range_mm"] = bootstrap_json(bootstrap_over_cases(
-      cases.size(),
+  over_patients["capture_range_mm"] = own;
+  over_patients["pooled_capture_range_mm"] = bootstrap_json(bootstrap_over_cases(
+      patients.size(),
       [&](std::span<const std::size_t> drawn) {
-        return capture_range(pooled_intervals(cases, drawn)).initial_tre_mm;
+        return capture_range(pooled_intervals(patients, drawn)).initial_tre_mm;
       },
       options.seed));
 }

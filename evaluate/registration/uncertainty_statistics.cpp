@@ -28,26 +28,26 @@ struct Region {
   std::function<bool(const RegistrationRow&)> holds;
 };
 
-json coverage_json(const std::map<std::string, RowPointers>& by_case,
+json coverage_json(const std::map<std::string, RowPointers>& by_patient,
                    const StatisticsOptions& options,
                    const Region& region) {
-  std::vector<CaseMean> cases;
+  std::vector<CaseMean> patients;
   std::int64_t known = 0;
   std::int64_t held = 0;
-  for (const auto& [name, rows] : by_case) {
+  for (const auto& [name, rows] : by_patient) {
     CaseMean mean;
     for (const RegistrationRow* row : rows) {
-      if (!row->is_success(options.success_tre_mm) || !region.is_known(*row)) continue;
+      if (!row->is_right(options.success_tre_mm) || !region.is_known(*row)) continue;
       mean.count += 1.0;
       mean.sum += region.holds(*row) ? 1.0 : 0.0;
     }
     if (!(mean.count > 0.0)) continue;
     known += std::llround(mean.count);
     held += std::llround(mean.sum);
-    cases.push_back(mean);
+    patients.push_back(mean);
   }
   json result = proportion_json(held, known);
-  result["over_cases"] = interval_over_cases(cases, options.seed);
+  result["over_cases"] = interval_over_cases(patients, options.seed);
   return result;
 }
 
@@ -72,17 +72,17 @@ json confidence_json(const std::vector<double>& successes, const std::vector<dou
 
 }  // namespace
 
-json uncertainty_statistics(const std::map<std::string, RowPointers>& by_case,
+json uncertainty_statistics(const std::map<std::string, RowPointers>& by_patient,
                             const StatisticsOptions& options) {
   std::vector<double> successes;
   std::vector<double> failures;
   std::vector<double> squared_distances;
-  for (const auto& [name, rows] : by_case)
+  for (const auto& [name, rows] : by_patient)
     for (const RegistrationRow* row : rows) {
-      const bool is_success = row->is_success(options.success_tre_mm);
+      const bool is_right = row->is_right(options.success_tre_mm);
       if (std::isfinite(row->uncertainty.confidence))
-        (is_success ? successes : failures).push_back(row->uncertainty.confidence);
-      if (is_success && std::isfinite(row->squared_distance))
+        (is_right ? successes : failures).push_back(row->uncertainty.confidence);
+      if (is_right && std::isfinite(row->squared_distance))
         squared_distances.push_back(row->squared_distance);
     }
   if (successes.empty() && failures.empty() && squared_distances.empty()) return nullptr;
@@ -94,8 +94,8 @@ json uncertainty_statistics(const std::map<std::string, RowPointers>& by_case,
   const Region tre = {
       [](const RegistrationRow& row) { return std::isfinite(row.uncertainty.tre_95_mm); },
       [](const RegistrationRow& row) { return row.tre_mm <= row.uncertainty.tre_95_mm; }};
-  return {{"pose_region_95", coverage_json(by_case, options, pose)},
-          {"tre_region_95", coverage_json(by_case, options, tre)},
+  return {{"pose_region_95", coverage_json(by_patient, options, pose)},
+          {"tre_region_95", coverage_json(by_patient, options, tre)},
           {"median_squared_distance", number_json(summarize(squared_distances).median)},
           {"confidence", confidence_json(successes, failures)}};
 }

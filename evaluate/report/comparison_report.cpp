@@ -38,7 +38,7 @@ std::string search_text(const json& summary, const json& renderer) {
     for (const char* part : {"preset", "similarity", "optimizer"})
       if (const std::string value = method.value(part, ""); !value.empty())
         text += (text.empty() ? "" : ", ") + escaped(value);
-  return text.empty() ? "–" : text;
+  return text.empty() ? "–" : element("span", text, "search");
 }
 
 /// Of the patients' own capture ranges the mean, and the smallest; the range of all starts together

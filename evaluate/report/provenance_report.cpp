@@ -147,7 +147,9 @@ std::string run_provenance(const EvaluationRun& run) {
   const std::string link = run.link("reproduce.sh");
   return element("h3", title_of_kind(run.kind) + ": " + escaped(run.name)) +
          definition_list(
-             {{"Program", text("program") + " " + text("program_version")},
+             {{"Program",
+               text("program") + " " + text("program_version") + ", commit " +
+                   escaped(provenance.value("program_commit", "unknown"))},
               {"Started (UTC)", text("started_utc")},
               {"Compiler, processor",
                text("compiler") + ", " + escaped(host.value("cpu", "unknown")) + " (" +

@@ -55,6 +55,17 @@ std::string refused_text(const IntervalDraws& draws) {
          percent(draws.refused / draws.draws) + ")";
 }
 
+/// What became of draws that the fields do not hold, by the run's rule.
+std::string draws_text(const std::string& start_rule) {
+  if (start_rule == "within-range")
+    return "Starts were drawn inside the fields' motion range, so that turns that do not fit are "
+           "missing: the share of rotation says what is left of the half that it makes up near "
+           "the pose";
+  if (start_rule == "given") return "The starts were given by a table";
+  return "Draws outside the fields' motion range were refused and drawn again; where many were, "
+         "rotation makes up less of the starts than the half that it does without refusals";
+}
+
 std::string success_table(const json& summary) {
   const json& renderers = summary.at("renderers");
   std::vector<HtmlTable::Column> columns = {{"Initial TRE (mm)", false}};
@@ -66,9 +77,8 @@ std::string success_table(const json& summary) {
   columns.push_back({"Draws refused", true});
   columns.push_back({"Share of rotation", true});
   HtmlTable table(columns,
-                  "Success per interval of initial error, with Wilson intervals. Draws outside the "
-                  "fields' motion range were refused and drawn again; where many were, rotation "
-                  "makes up less of the starts than the half that it does without refusals");
+                  "Success per interval of initial error, with Wilson intervals. " +
+                      draws_text(summary.value("start_rule", "")));
   const std::size_t intervals = renderers.at(0).at("intervals").size();
   for (std::size_t i = 0; i < intervals; ++i) {
     const json& first = renderers.at(0).at("intervals").at(i);
@@ -165,7 +175,10 @@ std::string threshold_table(const json& renderers) {
   std::vector<std::string> gross = {"gross failures: 10 mm or more, or no pose"};
   for (const json& renderer : renderers) {
     gross.push_back(rate_with_interval(renderer.at("gross_failures")));
-    gross.emplace_back("–");
+    // Runs of earlier versions counted by TRE alone.
+    gross.push_back(renderer.contains("mrpd_gross_failures")
+                        ? rate_with_interval(renderer.at("mrpd_gross_failures"))
+                        : "–");
   }
   table.add_row(gross);
   return table.html();
@@ -281,32 +294,33 @@ std::string other_errors_table(const json& renderers) {
   return table.html();
 }
 
-/// How few cases affect the bootstrap, and which interval to take instead.
+/// How few patients affect the bootstrap, and which interval to take instead.
 std::string optimism_text(const json& rate) {
   if (!rate.at("is_optimistic").get<bool>()) return "";
   std::string text =
-      " <strong>With so few cases this interval is too narrow</strong>: it holds the "
+      " <strong>With so few patients this interval is too narrow</strong>: it holds the "
       "truth less often than it says.";
   if (rate.value("student_low", json()).is_number())
-    text += " Student's interval of the cases' own rates is " +
+    text += " Student's interval of the patients' own rates is " +
             percent(rate.at("student_low").get<double>()) + " to " +
             percent(rate.at("student_high").get<double>()) + ".";
   return text;
 }
 
 /// Intervals over patients, with a warning where these are too few.
-std::string over_cases_text(const json& renderers) {
+std::string over_patients_text(const json& renderers) {
   std::string text;
   for (const json& renderer : renderers) {
     const json& rate = renderer.at("over_cases").at("rate");
-    const auto cases = count_of(rate.at("cases"));
+    const auto patients = count_of(rate.at("cases"));
     if (!rate.at("low").is_number()) continue;
-    text += element("p",
-                    "<strong>Over patients</strong> (" + method_title(renderer) +
-                        "): resampling the " + std::to_string(cases) +
-                        " cases gives a 95 % interval of " + percent(rate.at("low").get<double>()) +
-                        " to " + percent(rate.at("high").get<double>()) + " for the success rate." +
-                        optimism_text(rate));
+    text +=
+        element("p",
+                "<strong>Over patients</strong> (" + method_title(renderer) + "): resampling the " +
+                    std::to_string(patients) + " patients gives a 95 % interval of " +
+                    percent(rate.at("low").get<double>()) + " to " +
+                    percent(rate.at("high").get<double>()) + " for the success rate." +
+                    optimism_text(rate));
   }
   if (!text.empty()) return text;
   return element("p", "One patient says nothing about others: there is no interval over patients.");
@@ -331,7 +345,7 @@ std::string case_table(const json& summary) {
                    {"Gold standard by itself (mm)", true},
                    {"Median seconds", true},
                    {"Median evaluations", true}},
-                  "Per patient (the paper's Table II)");
+                  "Per case: a patient, or one of a patient's poses (the paper's Table II)");
   for (const json& renderer : summary.at("renderers"))
     for (const json& entry : renderer.at("cases"))
       table.add_row(
@@ -563,7 +577,7 @@ std::string registration_section(const EvaluationRun& run, const std::string& ti
          problems_text(summary.at("row_problems")) + registration_figures(run) +
          success_table(summary) + capture_table(renderers) + error_table(renderers) +
          threshold_table(renderers) + one_view_text(summary) + other_errors_table(renderers) +
-         over_cases_text(renderers) + paired_text(summary.at("field_against_raycast")) +
+         over_patients_text(renderers) + paired_text(summary.at("field_against_raycast")) +
          case_table(summary) + gold_table(summary.at("cases")) + element("h3", "Failures") +
          reason_table(renderers) + failures_text(run) + appearance_text(run) + setting_text(run);
 }

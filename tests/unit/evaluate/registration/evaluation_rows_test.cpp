@@ -332,10 +332,44 @@ TEST(RegistrationStatistics, OfCasesThatAllSucceedHaveNoSpreadOverCases) {
   EXPECT_TRUE(rate["student_low"].is_null());
 }
 
-TEST(Warnings, AreGivenWhereCasesAreTooFew) {
-  EXPECT_THAT(warnings_about_cases(1), testing::ElementsAre(testing::HasSubstr("one case")));
-  EXPECT_THAT(warnings_about_cases(4), testing::ElementsAre(testing::HasSubstr("4 cases: ")));
-  EXPECT_THAT(warnings_about_cases(30), testing::IsEmpty());
+// Three true poses of one patient are no three patients: there is no interval over patients.
+TEST(RegistrationStatistics, CasesOfOnePatientAreOnePatient) {
+  const Rows rows = {row("field", 0, 1, 0.2, "head-002-p1"),
+                     row("field", 0, 1, 0.3, "head-002-p2"),
+                     row("field", 0, 1, 9.0, "head-002-p3"),
+                     row("field", 0, 1, 0.4, "spine-003-p1")};
+  const json result = renderer_statistics(rows, "field", {});
+  EXPECT_EQ(result["cases"].size(), 4u);
+  EXPECT_EQ(result["over_cases"]["rate"]["cases"], 2);
+  const json alone = renderer_statistics(Rows(rows.begin(), rows.begin() + 3), "field", {});
+  EXPECT_EQ(alone["over_cases"]["rate"]["cases"], 1);
+  EXPECT_TRUE(alone["over_cases"]["rate"]["low"].is_null());
+  EXPECT_EQ(patient_count(std::vector<std::string>{"head-002-p1", "head-002-p2", "skull"}), 2u);
+}
+
+// One view shows no depth: 40 mm along its beam, the place is right; 5 mm across it, it is wrong.
+TEST(RegistrationStatistics, OfOneViewAreByMrpd) {
+  Rows rows = {row("field", 0, 1, 40.0), row("field", 1, 1, 5.0)};
+  rows[0].errors.mrpd_mm = 0.4;
+  rows[1].errors.mrpd_mm = 5.0;
+  for (RegistrationRow& of_view : rows) {
+    of_view.has_one_view = true;
+    of_view.uncertainty.confidence = of_view.errors.mrpd_mm < 1.0 ? 0.99 : 0.1;
+  }
+  const json result = renderer_statistics(rows, "field", {});
+  EXPECT_EQ(result["successes"], 0);
+  EXPECT_EQ(result["gross_failures"]["successes"], 1);
+  EXPECT_EQ(result["mrpd_gross_failures"]["successes"], 0);
+  EXPECT_EQ(result["failures_by_reason"], json({{"other optimum", 1}}));
+  EXPECT_EQ(result["errors_of_successes"]["mrpd_mm"]["count"], 1);
+  EXPECT_EQ(result["uncertainty"]["confidence"]["failures"], 1);
+  EXPECT_EQ(result["uncertainty"]["confidence"]["roc_area"], 1.0);
+}
+
+TEST(Warnings, AreGivenWherePatientsAreTooFew) {
+  EXPECT_THAT(warnings_about_patients(1), testing::ElementsAre(testing::HasSubstr("one patient")));
+  EXPECT_THAT(warnings_about_patients(4), testing::ElementsAre(testing::HasSubstr("4 patients: ")));
+  EXPECT_THAT(warnings_about_patients(30), testing::IsEmpty());
 }
 
 TEST(RowProblems, NameDuplicatesAndRowsThatContradictThemselves) {
@@ -453,6 +487,19 @@ TEST(PairedStatistics, OfFewPatientsClaimNothingHoweverManyStarts) {
   EXPECT_TRUE(ends["is_equivalent"].is_null());
   EXPECT_EQ(ends["has_enough_cases"], false);
   EXPECT_FALSE(paired_statistics(rows, {0.1}).contains("end_distance_mm"));
+}
+
+TEST(PairedStatistics, ManyPosesOfOnePatientClaimNothing) {
+  Rows rows;
+  for (int pose = 1; pose <= 20; ++pose)
+    for (const char* renderer : {"field", "raycast"}) {
+      rows.push_back(row(renderer, 0, 1, 0.2, "head-002-p" + std::to_string(pose)));
+      rows.back().final_deg_mm = {};
+    }
+  const json ends =
+      paired_statistics(rows, {0.1, 1, kSuccessTreMm, shift_between})["end_distance_mm"];
+  EXPECT_EQ(ends["over_cases"]["cases"], 1);
+  EXPECT_TRUE(ends["is_equivalent"].is_null());
 }
 
 TEST(PairedStatistics, WeighPatientsAlikeHoweverManyPairsTheyHave) {
@@ -574,6 +621,7 @@ TEST(MethodComparison, OfAHandBuiltRunIsTheKnownOne) {
   rows[1].final_deg_mm = {0, 0.6, 0, 0, 2, 0};
   rows[4].final_deg_mm = {0, 0, 0, 0, 3, 0};
   for (RegistrationRow& each : rows) each.drr_count = 100 + each.start_index;
+  rows[0].errors.mrpd_mm = 0.1;
   write_text_file(folder / "registrations.csv", registrations_table(rows).to_text());
   EvaluationRun run{folder.path(), "registration", {}};
   run.summary["method"] = {{"preset", "fast"}, {"similarity", "gc"}, {"optimizer", "gradient"}};
@@ -597,7 +645,7 @@ TEST(MethodComparison, OfAHandBuiltRunIsTheKnownOne) {
   // Wilson's interval of 2 of 2 begins at 2 / (2 + 1.96^2) = 34 %, that of 0 of 1 ends at 79 %.
   EXPECT_THAT(text,
               testing::HasSubstr("| 100 [34, 100] / 0 [0, 79] / 0 [0, 79] | 2 / 1 / 1 | - / - / - "
-                                 "| - | 1 | 0.300, 0.300 | 0.224, 2.000 | 102 |"));
+                                 "| - | 1 | 0.300, 0.300 | 1 of 5, 0.100 | 0.224, 2.000 | 102 |"));
   EXPECT_EQ(methods_table(found).text(0, "gross_failures"), "1");  // the one without a pose
   EXPECT_EQ(methods_table(found).text(0, "successes_0_8_mm"), "2");
 }
@@ -751,7 +799,7 @@ TEST(MethodComparison, OfARunWithoutSuccessHasNoErrors) {
   const MethodRow method =
       method_rows({EvaluationRun{folder.path(), "registration", json::object()}}).front();
   EXPECT_TRUE(std::isnan(method.mean_tre_mm));
-  EXPECT_THAT(methods_markdown({method}), testing::HasSubstr("| -, - | -, - |"));
+  EXPECT_THAT(methods_markdown({method}), testing::HasSubstr("| -, - | 0 of 1, - | -, - |"));
 }
 
 TEST(MethodComparison, ScreenHasALinePerMeasureAndAColumnPerOptimizer) {
