@@ -28,15 +28,20 @@ mkdir -p "$out"
 
 # add NAME FILE [KEY VALUE]: appends FILE to OUT/NAME.csv, with KEY as the first column, when given.
 add() {
-  local target="$out/$1.csv" file="$2" key="${3:-}" value="${4:-}" sum header
+  local target="$out/$1.csv" file="$2" key="${3:-}" value="${4:-}" sum header last
   sum=$(sha256sum "$file" | cut -c1-16)
-  header="$(head -n 1 "$file"),commit,source_sha256"
+  # Tables of a population say themselves which programs made their runs.
+  if [[ "$(head -n 1 "$file")" == *,commit ]]; then
+    header="$(head -n 1 "$file"),source_sha256" last="$sum"
+  else
+    header="$(head -n 1 "$file"),commit,source_sha256" last="$commit,$sum"
+  fi
   [[ -z "$key" ]] || header="$key,$header"
   if [[ ! -f "$target" ]]; then
     printf '%s\n' "$header" >"$target"
   fi
   [[ "$(head -n 1 "$target")" == "$header" ]] || die 3 "$file: has other columns than $target"
-  tail -n +2 "$file" | awk -v first="${value:+$value,}" -v last=",$commit,$sum" '{print first $0 last}' >>"$target"
+  tail -n +2 "$file" | awk -v first="${value:+$value,}" -v last=",$last" '{print first $0 last}' >>"$target"
 }
 
 if [[ -f "$1/peers.csv" ]]; then

@@ -102,10 +102,19 @@ function(af_add_library name)
   endif()
 endfunction()
 
-# af_add_program(<name> SOURCES ... LIBS ...): an executable that is installed.
+set(af_commit_source ${PROJECT_BINARY_DIR}/build_commit.cpp)
+add_custom_target(
+  af_commit
+  COMMAND ${CMAKE_COMMAND} -D SOURCE=${PROJECT_SOURCE_DIR} -D OUTPUT=${af_commit_source} -P ${CMAKE_CURRENT_LIST_DIR}/WriteCommit.cmake
+  BYPRODUCTS ${af_commit_source}
+  VERBATIM)
+
+# af_add_program(<name> SOURCES ... LIBS ...): an executable that is installed, and knows its commit.
 function(af_add_program name)
   cmake_parse_arguments(arg "" "" "SOURCES;LIBS" ${ARGN})
-  add_executable(${name} ${arg_SOURCES})
+  add_executable(${name} ${arg_SOURCES} ${af_commit_source})
+  set_source_files_properties(${af_commit_source} PROPERTIES GENERATED TRUE SKIP_UNITY_BUILD_INCLUSION TRUE SKIP_PRECOMPILE_HEADERS TRUE)
+  add_dependencies(${name} af_commit)
   target_link_libraries(${name} PRIVATE af_compile_options ${arg_LIBS})
   af_compile_as(programs ${name})
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bin)

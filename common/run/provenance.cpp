@@ -49,8 +49,9 @@ std::string script_text(const Provenance& provenance) {
   const bool is_parallel = provenance.rank_count > 1;
   std::string text = "#!/bin/sh\n# Repeats the run that made the files beside this script.\n";
   text += "# " + comment_text(provenance.program) + " " + std::string(program_version()) + " (" +
-          std::string(compiler_description()) + "), started " + utc_text(process_start_time) +
-          ", " + std::to_string(provenance.rank_count) + " rank(s), seed " +
+          "commit " + std::string(program_commit()) + ", " + std::string(compiler_description()) +
+          "), started " + utc_text(process_start_time) + ", " +
+          std::to_string(provenance.rank_count) + " rank(s), seed " +
           std::to_string(provenance.seed) + "\n";
   if (!provenance.input_sha256.empty()) text += "# Its inputs, by SHA-256:\n";
   for (const auto& [name, hash] : provenance.input_sha256)
@@ -74,6 +75,7 @@ nlohmann::json to_json(const Provenance& provenance) {
   return {
       {"program", provenance.program},
       {"program_version", std::string(program_version())},
+      {"program_commit", std::string(program_commit())},
       {"compiler", std::string(compiler_description())},
       {"command_line", provenance.command_line},
       {"options_toml", provenance.options_toml},

@@ -50,16 +50,19 @@ void PopulationReader::read(const std::string& condition) {
   if (equals == 0 || equals == std::string::npos)
     throw InputError("--condition", condition, "must be NAME=FOLDER");
   PatientsByRenderer found;
+  std::set<std::string> commits;
   for (const EvaluationRun& run : find_runs({condition.substr(equals + 1)})) {
     if (run.kind != "registration") continue;
     check_counting(run);
+    commits.insert(run.summary.value("provenance", nlohmann::json::object())
+                       .value("program_commit", "unknown"));
     run.read_in_parts("registrations.csv",
                       [&](const CsvTable& part) { add_population_rows(part, found); });
   }
   if (found.empty())
     throw InputError("--condition", condition, "holds no finished registration run");
   for (auto& [renderer, patients] : found) {
-    PopulationCondition one{condition.substr(0, equals), {}};
+    PopulationCondition one{condition.substr(0, equals), {}, commits};
     if (found.size() > 1) one.name += ", " + renderer;
     for (auto& [name, outcomes] : patients) one.patients.push_back(std::move(outcomes));
     conditions_.push_back(std::move(one));

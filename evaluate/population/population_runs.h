@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,8 @@ namespace af::evaluation {
 struct PopulationCondition {
   std::string name;
   std::vector<PatientOutcomes> patients;
+  /// Of the programs that made the runs; "unknown" of those that do not say.
+  std::set<std::string> commits = {};
 };
 
 /// Collects the conditions of a study of many patients.

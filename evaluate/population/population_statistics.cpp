@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluate/population/population_statistics.h"
 
-#include <algorithm>
-#include <map>
 #include <numeric>
 #include <span>
 #include <utility>
 
-#include "base/hash_random.h"
-#include "base/sample_summary.h"
 #include "evaluate/statistics/patient_names.h"
 
 namespace af::evaluation {
@@ -23,48 +19,6 @@ std::vector<IntervalSuccess> intervals_of(const std::vector<TreOutcome>& outcome
                                           const PopulationCounting& counting) {
   return success_per_interval(
       outcomes, counting.intervals, counting.interval_width_mm, counting.success_mm);
-}
-
-/// Rates that an interval may truly have had. Looked up, because many intervals have the same few
-/// starts.
-class PlausibleRates {
- public:
-  /// `share` in [0, 1) says which of them.
-  double at(const IntervalSuccess& interval, double share) {
-    std::vector<double>& rates = rates_[{interval.successes, interval.trials}];
-    if (rates.empty())
-      for (int i = 0; i < kRates; ++i)
-        rates.push_back(plausible_rate(interval.successes, interval.trials, (i + 0.5) / kRates));
-    return rates[static_cast<std::size_t>(share * kRates)];
-  }
-
- private:
-  static constexpr int kRates = 256;
-  std::map<std::pair<std::int64_t, std::int64_t>, std::vector<double>> rates_;
-};
-
-/// Interval of plausible capture ranges of the patient: each interval keeps its number of starts,
-/// gets a true rate that is plausible given its successes, and successes are drawn with that rate.
-/// Two successes of two starts say little about an interval.
-MeanInterval capture_interval(const std::vector<IntervalSuccess>& intervals,
-                              std::uint64_t seed,
-                              PlausibleRates& rates) {
-  constexpr int kReplicates = 1000;
-  std::vector<double> ranges_mm;
-  for (int replicate = 0; replicate < kReplicates; ++replicate) {
-    HashRandom random(seed, static_cast<std::uint64_t>(replicate));
-    std::vector<IntervalSuccess> drawn = intervals;
-    for (IntervalSuccess& interval : drawn) {
-      if (interval.trials == 0) continue;
-      const double rate = rates.at(interval, random.uniform());
-      interval.successes = 0;
-      for (std::int64_t i = 0; i < interval.trials; ++i)
-        interval.successes += random.uniform() < rate ? 1 : 0;
-    }
-    ranges_mm.push_back(capture_range(drawn).initial_tre_mm);
-  }
-  std::sort(ranges_mm.begin(), ranges_mm.end());
-  return {quantile(ranges_mm, 0.025), quantile(ranges_mm, 0.975)};
 }
 
 double mean_of(const std::vector<double>& values) {
@@ -177,7 +131,6 @@ PopulationSuccess population_success(const std::vector<const PatientOutcomes*>& 
   PopulationSuccess result;
   std::vector<std::vector<IntervalSuccess>> own;  // per patient
   std::vector<TreOutcome> all;
-  PlausibleRates rates;
   for (const PatientOutcomes* patient : patients) {
     const std::vector<TreOutcome>& outcomes = ends_of(*patient, end);
     own.push_back(intervals_of(outcomes, counting));
@@ -188,8 +141,7 @@ PopulationSuccess population_success(const std::vector<const PatientOutcomes*>& 
     success.successes = count_successes(outcomes, counting.success_mm);
     success.wilson = wilson_interval(success.successes, success.starts);
     success.capture = capture_range(own.back());
-    success.capture_interval_mm =
-        capture_interval(own.back(), hash64(counting.seed, hash_name(patient->patient)), rates);
+    result.capture_lower_bounds += success.capture.is_whole_study() ? 1 : 0;
     result.starts += success.starts;
     result.successes += success.successes;
     result.patients_with_failures += success.successes < success.starts ? 1 : 0;

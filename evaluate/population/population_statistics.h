@@ -51,10 +51,9 @@ struct PatientSuccess {
   std::int64_t starts = 0;
   std::int64_t successes = 0;
   ProportionInterval wilson;
+  /// Without an interval: two or three starts per interval of initial TRE do not tell a rate of 95
+  /// % from others, so that what a patient's own starts leave plausible begins at 0.
   CaptureRange capture;
-  /// 95 % interval of capture ranges that are plausible given the patient's starts: each interval's
-  /// rate is drawn from Jeffreys' posterior, and its successes are drawn with that rate.
-  MeanInterval capture_interval_mm;
 };
 
 /// Success of a group of patients by one error. \test PopulationStatistics.OfHandMadePatients
@@ -67,10 +66,11 @@ struct PopulationSuccess {
   /// narrow where few patients lose many.
   std::int64_t patients_with_failures = 0;
   ProportionInterval share_with_failures;  ///< Wilson's, of such patients
-  OverPatients rate;                 ///< of all starts; every patient has its own number of them
-  OverPatients capture_mm;           ///< mean of the patients' own capture ranges
-  CaptureRange pooled;               ///< of all starts together
-  CaseBootstrap pooled_interval_mm;  ///< of the pooled range, by resampling of patients
+  OverPatients rate;        ///< of all starts; every patient has its own number of them
+  OverPatients capture_mm;  ///< mean of the patients' own capture ranges
+  std::int64_t capture_lower_bounds = 0;   ///< patients whose range is at least the whole study's
+  CaptureRange pooled;                     ///< of all starts together
+  CaseBootstrap pooled_interval_mm;        ///< of the pooled range, by resampling of patients
   std::vector<IntervalSuccess> intervals;  ///< of all starts together
   std::vector<CaseBootstrap> interval_bootstraps;
 };

@@ -5,8 +5,10 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <set>
 #include <utility>
 
+#include "base/joined.h"
 #include "base/number_text.h"
 #include "base/sample_summary.h"
 
@@ -21,7 +23,8 @@ PopulationGroup group_of(const PopulationCondition& condition,
   PopulationGroup group{condition.name,
                         name,
                         population_success(patients, CountedEnd::Tre, counting),
-                        population_success(patients, CountedEnd::Mrpd, counting)};
+                        population_success(patients, CountedEnd::Mrpd, counting),
+                        joined(condition.commits, " ")};
   std::vector<double> tre_mm;
   std::vector<double> seconds;
   for (const PatientOutcomes* patient : patients) {
@@ -61,6 +64,7 @@ std::vector<NamedCell> success_of(const PopulationSuccess& success) {
       {"bootstrap_high", number(rate.bootstrap.high)},
       {"worst_patient_rate", number(worst)},
       {"capture_mm", number(success.pooled.initial_tre_mm)},
+      {"capture_ended_by", to_string(success.pooled.end)},
       {"capture_bootstrap_low_mm", number(success.pooled_interval_mm.low)},
       {"capture_bootstrap_high_mm", number(success.pooled_interval_mm.high)},
       {"patients_capture_mean_mm", number(own.value)},
@@ -69,6 +73,7 @@ std::vector<NamedCell> success_of(const PopulationSuccess& success) {
       {"patients_capture_bootstrap_low_mm", number(own.bootstrap.low)},
       {"patients_capture_bootstrap_high_mm", number(own.bootstrap.high)},
       {"patients_capture_smallest_mm", number(smallest_mm)},
+      {"patients_capture_lower_bounds", std::to_string(success.capture_lower_bounds)},
       {"patients_with_failures", std::to_string(success.patients_with_failures)},
       {"share_with_failures_low", number(success.share_with_failures.low)},
       {"share_with_failures_high", number(success.share_with_failures.high)}};
@@ -107,9 +112,18 @@ std::string success_cells(const PopulationSuccess& success) {
          percent(success.rate.student.high) + " | " + below_text(success, kBelow1Mm) + " / " +
          below_text(success, kBelow5Mm) + " | " + (success.pooled.is_whole_study() ? ">= " : "") +
          millimetre_text(success.pooled.initial_tre_mm) + " | " +
+         (success.capture_lower_bounds > 0 ? ">= " : "") +
          millimetre_text(success.capture_mm.value) + " (" +
          millimetre_text(success.capture_mm.bootstrap.low) + " to " +
          millimetre_text(success.capture_mm.bootstrap.high) + ")";
+}
+
+/// Which programs made the runs: tables that mix several say so.
+std::string commits_text(const std::vector<PopulationGroup>& groups) {
+  std::set<std::string> commits;
+  for (const PopulationGroup& group : groups) commits.insert(group.commits);
+  return "\nCommits of the programs: " + joined(commits, ", ") +
+         (commits.size() > 1 ? ". Conditions are of different programs.\n" : ".\n");
 }
 
 bool is_kind(const PopulationGroup& group) {
@@ -197,6 +211,7 @@ CsvTable population_table(const std::vector<PopulationGroup>& groups) {
       "condition", "group", "patients", "starts", "median_tre_mm", "median_seconds"};
   for (const char* const error : {"tre_", "mrpd_"})
     for (const NamedCell& cell : success_of({})) columns.push_back(error + cell.name);
+  columns.emplace_back("commit");
   CsvTable table(columns);
   for (const PopulationGroup& group : groups) {
     std::vector<std::string> fields{group.condition,
@@ -207,6 +222,7 @@ CsvTable population_table(const std::vector<PopulationGroup>& groups) {
                                     number_text(group.median_seconds)};
     for (const PopulationSuccess* success : {&group.by_tre, &group.by_mrpd})
       for (NamedCell& cell : success_of(*success)) fields.push_back(std::move(cell.text));
+    fields.push_back(group.commits);
     table.add_row(std::move(fields));
   }
   return table;
@@ -220,11 +236,11 @@ CsvTable patients_table(const std::vector<PopulationGroup>& groups) {
                   "wilson_low",
                   "wilson_high",
                   "capture_mm",
-                  "capture_low_mm",
-                  "capture_high_mm",
                   "capture_ended_by",
                   "mrpd_successes",
-                  "mrpd_capture_mm"});
+                  "mrpd_capture_mm",
+                  "mrpd_capture_ended_by",
+                  "commit"});
   for (const PopulationGroup& group : groups) {
     if (group.group != "all") continue;
     for (std::size_t i = 0; i < group.by_tre.patients.size(); ++i) {
@@ -237,11 +253,11 @@ CsvTable patients_table(const std::vector<PopulationGroup>& groups) {
                      number_text(tre.wilson.low),
                      number_text(tre.wilson.high),
                      number_text(tre.capture.initial_tre_mm),
-                     number_text(tre.capture_interval_mm.low),
-                     number_text(tre.capture_interval_mm.high),
                      to_string(tre.capture.end),
                      std::to_string(mrpd.successes),
-                     number_text(mrpd.capture.initial_tre_mm)});
+                     number_text(mrpd.capture.initial_tre_mm),
+                     to_string(mrpd.capture.end),
+                     group.commits});
     }
   }
   return table;
@@ -255,7 +271,8 @@ CsvTable intervals_table(const std::vector<PopulationGroup>& groups) {
                   "starts",
                   "successes",
                   "bootstrap_low",
-                  "bootstrap_high"});
+                  "bootstrap_high",
+                  "commit"});
   for (const PopulationGroup& group : groups) {
     if (group.group != "all") continue;
     for (const bool is_tre : {true, false}) {
@@ -268,7 +285,8 @@ CsvTable intervals_table(const std::vector<PopulationGroup>& groups) {
                        std::to_string(success.intervals[k].trials),
                        std::to_string(success.intervals[k].successes),
                        number_text(success.interval_bootstraps[k].low),
-                       number_text(success.interval_bootstraps[k].high)});
+                       number_text(success.interval_bootstraps[k].high),
+                       group.commits});
     }
   }
   return table;
@@ -282,7 +300,7 @@ std::string population_text(const std::vector<PopulationGroup>& groups,
          population_markdown(groups, true) +
          "\nKinds of patients: success, % (TRE / mRPD), capture range of all starts, mm (TRE / "
          "mRPD):\n\n" +
-         kinds_markdown(groups);
+         kinds_markdown(groups) + commits_text(groups);
 }
 
 }  // namespace af::evaluation

@@ -17,6 +17,7 @@ struct PopulationGroup {
   std::string group;  ///< "all", "odd", "even", "real", or a kind of patient
   PopulationSuccess by_tre;
   PopulationSuccess by_mrpd;
+  std::string commits;          ///< of the programs that made the condition's runs
   double median_tre_mm = kNan;  ///< of successes
   double median_seconds = kNan;
 };

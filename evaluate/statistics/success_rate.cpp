@@ -2,7 +2,6 @@
 #include "evaluate/statistics/success_rate.h"
 
 #include <algorithm>
-#include <boost/math/distributions/beta.hpp>
 #include <boost/math/distributions/normal.hpp>
 #include <cmath>
 #include <cstddef>
@@ -23,12 +22,6 @@ ProportionInterval wilson_interval(std::int64_t successes, std::int64_t trials, 
   const double half = z * std::sqrt(p * (1.0 - p) / n + z * z / (4.0 * n * n)) / denominator;
   // Exactly 0 and 1 at the ends, where rounding would leave 1e-17.
   return {successes == 0 ? 0.0 : center - half, successes == trials ? 1.0 : center + half};
-}
-
-double plausible_rate(std::int64_t successes, std::int64_t trials, double p) {
-  const boost::math::beta_distribution<double> posterior(
-      static_cast<double>(successes) + 0.5, static_cast<double>(trials - successes) + 0.5);
-  return boost::math::quantile(posterior, p);
 }
 
 std::int64_t count_successes(std::span<const TreOutcome> outcomes, double threshold_mm) {

@@ -31,10 +31,6 @@ ProportionInterval wilson_interval(std::int64_t successes,
                                    std::int64_t trials,
                                    double confidence = 0.95);
 
-/// Quantile `p` in (0, 1) of the rates that are plausible given the successes: of Jeffreys'
-/// posterior, Beta( successes + 1/2, failures + 1/2).
-double plausible_rate(std::int64_t successes, std::int64_t trials, double p);
-
 /// Success among the starts of one interval of initial TRE.
 struct IntervalSuccess {
   double low_mm = 0.0;

@@ -48,6 +48,8 @@ TEST(Provenance, JsonRecordsTheMakingOfAnOutput) {
   const nlohmann::json json = to_json(example());
   EXPECT_EQ(json["program"], "af-register");
   EXPECT_EQ(json["program_version"], program_version());
+  // A test is no program.
+  EXPECT_EQ(json["program_commit"], "unknown");
   EXPECT_EQ(json["compiler"], compiler_description());
   EXPECT_EQ(json["command_line"], example().command_line);
   EXPECT_EQ(json["options_toml"], "seed = 7\n");

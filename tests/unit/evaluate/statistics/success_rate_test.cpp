@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include <gtest/gtest.h>
 
@@ -14,15 +13,6 @@ namespace {
 
 // Published values carry four decimals.
 constexpr double kPublishedRounding = 5e-5;
-
-TEST(PlausibleRate, IsAQuantileOfJeffreysPosterior) {
-  // Beta(1/2, 1/2) is the arcsine law, whose quantile is sin^2(pi p / 2).
-  EXPECT_NEAR(plausible_rate(0, 0, 0.5), 0.5, 1e-12);
-  EXPECT_NEAR(plausible_rate(0, 0, 0.1), std::pow(std::sin(0.05 * std::numbers::pi), 2), 1e-12);
-  // SciPy 1.10, scipy.stats.beta.ppf([0.025, 0.975], 5.5, 5.5).
-  EXPECT_NEAR(plausible_rate(5, 10, 0.025), 0.22352867, 1e-8);
-  EXPECT_NEAR(plausible_rate(5, 10, 0.975), 0.77647133, 1e-8);
-}
 
 TEST(WilsonInterval, EqualsPublishedValues) {
   // Newcombe, "Two-sided confidence intervals for the single proportion", Statistics in Medicine
