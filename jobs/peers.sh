@@ -21,6 +21,7 @@ build/release/bin; peers that are not installed (jobs/install-packages.sh --with
 
   --output DIR             where everything goes                                                             [./peers]
   --kind KIND              phantom: spine, pelvis or head                                                      [spine]
+  --anatomy-seed N         a drawn patient of this kind (af-simulate); 0: the typical adult                         [0]
   --starts-per-interval N  starts in each of the intervals of 2 mm                                                 [5]
   --intervals N            from 0 mm                                                                               [8]
   --autodiff-starts N      of these, evenly, for automatic differentiation; 0: all                                 [0]
@@ -31,11 +32,12 @@ build/release/bin; peers that are not installed (jobs/install-packages.sh --with
 TEXT
 }
 
-target="$PWD/peers" kind=spine starts=5 intervals=8 autodiff_starts=0 plastimatch_starts=10 python=/usr/bin/python3 seed=1
+target="$PWD/peers" kind=spine anatomy_seed=0 starts=5 intervals=8 autodiff_starts=0 plastimatch_starts=10 python=/usr/bin/python3 seed=1
 while (($# > 0)); do
   case "$1" in
     --output | -o) need_value "$1" $#; target=$2; shift ;;
     --kind) need_value "$1" $#; kind=$2; shift ;;
+    --anatomy-seed) need_value "$1" $#; need_seed "$1" "$2"; anatomy_seed=$2; shift ;;
     --starts-per-interval) need_value "$1" $#; need_count "$1" "$2"; starts=$2; shift ;;
     --intervals) need_value "$1" $#; need_count "$1" "$2"; intervals=$2; shift ;;
     --autodiff-starts) need_value "$1" $#; need_seed "$1" "$2"; autodiff_starts=$2; shift ;;
@@ -96,6 +98,8 @@ peer() {
   evaluate "$case_name-$name" "$case_name" --poses-from "$poses" --method-name "$name"
 }
 
+patient=()
+((anatomy_seed == 0)) || patient=(--anatomy-seed "$anatomy_seed")
 # What the peers' poses depend on beside the words of their commands.
 # shellcheck disable=SC2034  # for stage()
 stage_inputs="seed $seed, $starts in each of $intervals, $(cat "$af_root"/evaluate/peers/*.py | sha256sum)"
@@ -103,7 +107,7 @@ for variant in clean stressed; do
   case_name="$kind-$variant" stress=$(stress_of "$variant")
   stage "simulate-$case_name" "$output/studies/$case_name/study.toml" "$bin/af-simulate" --phantom "$kind" \
     --phantom-voxel-mm 2 --rig c-arm-12in --case "$kind" --seed "$seed" --no-fiducials ${stress:+--stress "$stress"} \
-    --force -o "$output/studies/$case_name"
+    --force "${patient[@]}" -o "$output/studies/$case_name"
   of_case=()
   for camera in AP LAT; do
     field "$case_name" "$camera"

@@ -23,16 +23,26 @@ def field_seconds(folder, case):
     return sum(float(file.read_text()) for file in files) if len(files) == 2 else math.nan
 
 
+def given_starts(folder, case, method):
+    """Indices of the starts that a peer was given; none says: all, as our own methods are."""
+    poses = folder / "poses" / f"{case}-{method}.csv"
+    if not poses.exists():
+        return None
+    with open(poses, newline="", encoding="utf-8") as file:
+        return {int(row["start_index"]) for row in csv.DictReader(file)}
+
+
 def entries_of(folder, case, method):
     path = folder / "runs" / f"{case}-{method}" / "registrations.csv"
     if not path.exists():
         return []
     with open(path, newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
+    given = given_starts(folder, case, method)
     entries = []
     for renderer in dict.fromkeys(row["renderer"] for row in rows):
-        # Starts that a peer was not given have no pose and no time.
-        mine = [row for row in rows if row["renderer"] == renderer and row["seconds"] not in ("", "nan")]
+        # A start without a pose stays in the denominator, unless the peer was not given it.
+        mine = [row for row in rows if row["renderer"] == renderer and (given is None or int(row["start_index"]) in given)]
         tres = [tre for tre in numbers(mine, "tre_mm") if tre < SUCCESS_TRE_MM]
         entries.append(
             {
@@ -42,7 +52,7 @@ def entries_of(folder, case, method):
                 "starts": len(mine),
                 "successes": len(tres),
                 "median_tre_mm": statistics.median(tres) if tres else math.nan,
-                "median_seconds": statistics.median(numbers(mine, "seconds")) if mine else math.nan,
+                "median_seconds": statistics.median(numbers(mine, "seconds")) if numbers(mine, "seconds") else math.nan,
                 "precompute_seconds": field_seconds(folder, case) if renderer == "field" else 0.0,
             }
         )
