@@ -37,10 +37,12 @@ class Row:
 
         self.measure = measure
         self.variant = variant
+        self.views = views
         self.case = f"{cells['case']} {variant}"
         self.patient = re.sub(r"-p\d+$", "", cells["case"])
         drawn = re.fullmatch(r"(?:spine|pelvis|head|bone)-(\d{3,})-p\d+", cells["case"])
         self.is_for_fit = drawn is not None and int(drawn[1]) % 2 == 1
+        self.half = "real" if drawn is None else "odd" if self.is_for_fit else "even"
         self.tre = number("tre_mm")
         self.is_success = (self.tre if views > 1 else number("mrpd_mm")) < SUCCESS_MM
         self.fine_mean = number("judge_fine_mean")
@@ -68,9 +70,13 @@ class Row:
         return max(0.0, math.log(EXPLAINED_SHARE / min(max(self.fine_mean, LEAST_SHARE), 1.0)))
 
     def features(self):
-        """The distance of a portfolio's ends is none of them: where no portfolio fails it would stand for success."""
+        """As in success_confidence(). The distance of a portfolio's ends is none of them: where no portfolio fails it would
+        stand for success."""
+        in_silhouettes = self.measure == MEASURE_OF["bone"]
+        if self.views == 1 and not in_silhouettes:
+            return [1.0, self.excess, math.log(max(self.excess / max(self.fine_mean, LEAST_SHARE), LEAST_EXCESS))]
         tre = FAR_MM if math.isnan(self.tre_rms) else min(max(self.tre_rms, NEAR_MM), FAR_MM)
-        excess = math.log(max(self.excess, LEAST_EXCESS)) if self.measure == MEASURE_OF["bone"] else self.excess
+        excess = math.log(max(self.excess, LEAST_EXCESS)) if in_silhouettes else self.excess
         return [1.0, excess, math.log(tre)]
 
 
@@ -121,6 +127,13 @@ def inflation_of(row, constants):
 
 def constants_text(constants):
     return "{" + ", ".join(f"{number:.2f}" for number in constants) + "}"
+
+
+def names_of(measures, views):
+    """Of constants in calibration.cpp: the kind of their rows, and those of the confidence."""
+    if measures == [MEASURE_OF["bone"]]:
+        return "Silhouettes", "kInSilhouettes"
+    return ("OneView", "kOneView") if views == 1 else ("Views", "kOverRegions")
 
 
 def solve(matrix, right):
@@ -280,6 +293,7 @@ def reliability(rows):
 
 def fit(rows, measures):
     """Prints the constants that fit the rows that are for it, and has all rows foretold by them."""
+    evidence, confidence = names_of(measures, rows[0].views)
     for measure in measures:
         mine = [r for r in rows if r.measure == measure]
         fitted = [r for r in mine if r.is_for_fit and r.is_success and not math.isnan(r.distance)]
@@ -289,15 +303,14 @@ def fit(rows, measures):
         # directions do, and may be foretold too large.
         pose = fit_inflation(fitted, [row.distance / REGION_95 for row in fitted], 0.0)
         tre = fit_inflation(fitted, [(row.tre / row.tre_95) ** 2 for row in fitted], -math.inf)
-        name, is_in_silhouettes = ("gc", "true") if measure == MEASURE_OF["bone"] else (measure, "false")
-        print(f'    InflationRow{{"{name}", {is_in_silhouettes}, {constants_text(pose)}, {constants_text(tre)}}},')
+        name = measure.removesuffix(" in silhouettes")
+        print(f'    InflationRow{{"{name}", Evidence::{evidence}, {constants_text(pose)}, {constants_text(tre)}}},')
         for row in mine:
             if row.has_pose:
                 row.inflation = inflation_of(row, pose)
                 row.tre_inflation = inflation_of(row, tre)
     coefficients = fit_confidence([row for row in rows if row.is_for_fit and row.has_confidence])
-    name = "kInSilhouettes" if measures == [MEASURE_OF["bone"]] else "kOverRegions"
-    print(f"constexpr Confidence {name}{constants_text(coefficients)};")
+    print(f"constexpr Confidence {confidence}{constants_text(coefficients)};")
     for row in rows:
         # Ends that the verdict calls not found have none, whatever the constants.
         if row.has_confidence and row.stated_confidence != 0.0:
@@ -318,7 +331,7 @@ def options():
     parser.add_argument("population", nargs="+", type=pathlib.Path, help="output folders of jobs/population.sh or jobs/bones.sh")
     parser.add_argument("--presets", default="robust,fast", help="comma separated [%(default)s]")
     parser.add_argument("--variants", default="clean,all", help="comma separated, as in the population [%(default)s]")
-    parser.add_argument("--views", type=int, choices=(1, 2), default=2, help="of the registrations; those of one view are judged alone (--judge) [%(default)s]")
+    parser.add_argument("--views", type=int, choices=(1, 2), default=2, help="of the registrations; one view has constants of its own [%(default)s]")
     parser.add_argument("--judge", action="store_true", help="fit nothing: judge all patients by what the programs foretold")
     parser.add_argument("--csv", metavar="FILE", help="the table, as CSV")
     parser.add_argument("--commit", metavar="HASH",
@@ -329,8 +342,6 @@ def options():
     for preset in chosen.presets:
         if preset not in MEASURE_OF:
             parser.error(f"--presets names '{preset}': must be some of {', '.join(MEASURE_OF)}")
-    if chosen.views == 1 and not chosen.judge:
-        parser.error("--views = 1: needs --judge, because success of one view is another one (by mRPD) and no constants of its own are fitted")
     if "bone" in chosen.presets and len(chosen.presets) > 1:
         parser.error(f"--presets = '{','.join(chosen.presets)}': values within silhouettes have constants of their own, give bone alone")
     return chosen
@@ -401,6 +412,18 @@ def tables_of(rows, measures, halves):
     return table
 
 
+def tables_of_halves(rows, measures):
+    """The same as stated, of each half alone, and of every kind of patients in it."""
+    table = []
+    for half in dict.fromkeys(row.half for row in rows):
+        mine = [row for row in rows if row.half == half]
+        for label in measures + ["all"]:
+            table.append(summary(label, f"{half}, as stated", [r for r in mine if label in ("all", r.measure)]))
+        for kind in dict.fromkeys(row.kind() for row in mine) if half != "real" else ():
+            table.append(summary("all, " + kind, f"{half}, as stated", [r for r in mine if r.kind() == kind]))
+    return table
+
+
 def write_csv(path, table, origin):
     """`origin`: last cells of every row."""
     with open(path, "w", newline="", encoding="utf-8") as file:
@@ -424,6 +447,8 @@ def main():
         fit(rows, measures)
         halves = {"odd, fitted": True, "even, judged": False}
     table = tables_of(rows, measures, halves)
+    if chosen.judge:
+        table += tables_of_halves(rows, measures)
     print()
     for entry in table:
         print("  ".join(f"{k} {v:.3f}" if isinstance(v, float) else f"{k} {v}" for k, v in entry.items()))

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluate/population/population_runs.h"
 
+#include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -15,10 +16,24 @@ namespace {
 
 using PatientsByRenderer = std::map<std::string, std::map<std::string, PatientOutcomes>>;
 
-void add_population_rows(const CsvTable& table, PatientsByRenderer& found) {
+/// Which run has a case by a renderer: a copy of a run would count its starts twice.
+using RunOfCase = std::map<std::pair<std::string, std::string>, std::filesystem::path>;
+
+void add_population_rows(const CsvTable& table,
+                         const std::filesystem::path& run,
+                         RunOfCase& run_of_case,
+                         PatientsByRenderer& found) {
   for (std::size_t row = 0; row < table.row_count(); ++row) {
-    const std::string patient = patient_of_case(table.text(row, "case"));
-    PatientOutcomes& outcomes = found[table.text(row, "renderer")][patient];
+    const std::string& case_name = table.text(row, "case");
+    const std::string& renderer = table.text(row, "renderer");
+    const auto [known, is_new] = run_of_case.emplace(std::pair(renderer, case_name), run);
+    if (!is_new && known->second != run)
+      throw InputError(
+          "--condition",
+          run.string(),
+          "must not have case " + case_name + ", which " + known->second.string() + " has, too");
+    const std::string patient = patient_of_case(case_name);
+    PatientOutcomes& outcomes = found[renderer][patient];
     outcomes.patient = patient;
     const double initial_mm = table.number(row, "initial_tre_mm");
     outcomes.by_tre.push_back({initial_mm, table.number_or_nan(row, "tre_mm")});
@@ -51,13 +66,15 @@ void PopulationReader::read(const std::string& condition) {
     throw InputError("--condition", condition, "must be NAME=FOLDER");
   PatientsByRenderer found;
   std::set<std::string> commits;
+  RunOfCase run_of_case;
   for (const EvaluationRun& run : find_runs({condition.substr(equals + 1)})) {
     if (run.kind != "registration") continue;
     check_counting(run);
     commits.insert(run.summary.value("provenance", nlohmann::json::object())
                        .value("program_commit", "unknown"));
-    run.read_in_parts("registrations.csv",
-                      [&](const CsvTable& part) { add_population_rows(part, found); });
+    run.read_in_parts("registrations.csv", [&](const CsvTable& part) {
+      add_population_rows(part, run.folder, run_of_case, found);
+    });
   }
   if (found.empty())
     throw InputError("--condition", condition, "holds no finished registration run");

@@ -28,8 +28,9 @@ class PopulationReader {
   explicit PopulationReader(std::uint64_t seed) : seed_(seed) {}
 
   /// Adds NAME=FOLDER: all registration runs below the folder, one condition per renderer.
-  /// InputError when the text has another form, when nothing is found, or when a run counts in
-  /// other intervals or by another threshold than those before it; FileError for a broken run.
+  /// InputError when the text has another form, when nothing is found, when two runs have the same
+  /// case by one renderer, or when a run counts in other intervals or by another threshold than
+  /// those before it; FileError for a broken run.
   void read(const std::string& condition);
 
   [[nodiscard]] const std::vector<PopulationCondition>& conditions() const { return conditions_; }

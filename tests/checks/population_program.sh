@@ -60,8 +60,8 @@ grep -q sbatch out || fail "no command of Slurm: $(cat out)"
 
 uncertainty=(prefix/libexec/attenuation-fields/jobs/uncertainty.py --presets fast --variants clean)
 "${uncertainty[@]}" pop --judge --csv uncertainty.csv >out 2>err || fail "uncertainty.py: $(cat out err)"
-# gc, all, both of clean X-rays, and all of spines.
-[[ $(wc -l <uncertainty.csv) == 6 ]] || fail "uncertainty.py wrote $(cat uncertainty.csv)"
+# gc, all, both of clean X-rays, and all of spines; then gc, all and spines of odd numbers.
+[[ $(wc -l <uncertainty.csv) == 9 ]] || fail "uncertainty.py wrote $(cat uncertainty.csv)"
 grep -q '^gc,"all, as stated",' uncertainty.csv || fail "uncertainty.py wrote $(cat uncertainty.csv)"
 # Fields are too coarse for a success, which a fit needs: here is one. What the programs state is what the script would
 # by their constants.
@@ -73,10 +73,19 @@ grep -q '^constexpr Confidence kOverRegions{' fitted || fail "uncertainty.py fit
 prefix/libexec/attenuation-fields/jobs/bones.sh --output bones --bones 1 --intervals 3 --ranks 2 >out 2>err || fail "bones.sh: $(cat out err)"
 grep -q '^clean-2-bone,all,1,3,' bones/tables/population.csv || fail "bones.sh wrote $(cat bones/tables/population.csv)"
 prefix/libexec/attenuation-fields/jobs/uncertainty.py bones --presets bone --variants clean >fitted 2>err || fail "uncertainty.py: $(cat err)"
-for line in '    InflationRow{"gc", true, ' 'constexpr Confidence kInSilhouettes{'; do
+for line in '    InflationRow{"gc", Evidence::Silhouettes, ' 'constexpr Confidence kInSilhouettes{'; do
   grep -q "^$line" fitted || fail "uncertainty.py fitted $(cat fitted)"
 done
+mkdir one-view
+cp -r pop/runs one-view
+awk -F, -v OFS=, 'NR == 1 { for (i = 1; i <= NF; ++i) if ($i == "mrpd_mm") mrpd = i } NR == 2 { $mrpd = 0.5 } 1' \
+  pop/runs/clean-1-fast/spine-001/registrations.csv >one-view/runs/clean-1-fast/spine-001/registrations.csv
+"${uncertainty[@]}" one-view --views 1 >fitted 2>err || fail "uncertainty.py of one view: $(cat err)"
+for line in '    InflationRow{"gc", Evidence::OneView, ' 'constexpr Confidence kOneView{'; do
+  grep -q "^$line" fitted || fail "uncertainty.py of one view fitted $(cat fitted)"
+done
 python3 - "$root/register/uncertainty/calibration.cpp" kOverRegions pop/runs/clean-2-fast/spine-001/registrations.csv \
+  kOneView pop/runs/clean-1-fast/spine-001/registrations.csv \
   kInSilhouettes bones/runs/clean-2-bone/bone-001/registrations.csv <<'PYTHON' || fail "uncertainty.py differs from calibration.cpp"
 import csv, re, sys
 sys.path.insert(0, "prefix/libexec/attenuation-fields/jobs")
@@ -85,7 +94,8 @@ text = open(sys.argv[1], encoding="utf-8").read()
 for name, path in zip(sys.argv[2::2], sys.argv[3::2]):
     constants = [float(number) for number in re.search(name + r"\{([-0-9., ]+)\};", text)[1].split(",")]
     measure = "gc in silhouettes" if name == "kInSilhouettes" else "gc"
-    rows = [uncertainty.Row(measure, "clean", 2, cells) for cells in csv.DictReader(open(path, encoding="utf-8"))]
+    views = 1 if name == "kOneView" else 2
+    rows = [uncertainty.Row(measure, "clean", views, cells) for cells in csv.DictReader(open(path, encoding="utf-8"))]
     stated = [row for row in rows if row.has_confidence and row.stated_confidence != 0.0]
     assert stated, "no row states a confidence"
     for row in stated:
@@ -94,7 +104,6 @@ for name, path in zip(sys.argv[2::2], sys.argv[3::2]):
 PYTHON
 refuse 2 "must be some of robust, fast, paper, bone" "${uncertainty[@]}" --presets leg pop
 refuse 2 "give bone alone" "${uncertainty[@]}" --presets bone,fast pop
-refuse 2 'needs --judge' "${uncertainty[@]}" --views 1 pop
 "${uncertainty[@]}" pop --judge --views 1 >out 2>err || fail "uncertainty.py of one view: $(cat out err)"
 grep -q '^measure gc  half all, as stated' out || fail "uncertainty.py of one view wrote $(cat out)"
 refuse 4 'holds no finished run of clean-2-fast' "${uncertainty[@]}" missing
@@ -114,4 +123,8 @@ refuse 3 'NAME=FOLDER' "${evaluate[@]}" --condition pop
 mkdir empty
 refuse 3 'holds no finished run' "${evaluate[@]}" --condition clean-2-fast=empty
 refuse 4 'is not a folder of results' "${evaluate[@]}" --condition clean-2-fast=missing
+mkdir twice
+cp -r pop/runs/clean-2-fast twice/first
+cp -r pop/runs/clean-2-fast twice/copy
+refuse 3 'must not have case spine-001-p1, which .* has, too' "${evaluate[@]}" --condition clean-2-fast=twice
 [[ ! -e refused ]] || fail "a refused table left $(find refused)"

@@ -719,6 +719,11 @@ TEST_F(EvaluateProgram, DrawsNoPicturesWhereNoneAreWanted) {
   EXPECT_EQ(page.find("What it looks like"), std::string::npos);
   EXPECT_EQ(page.find("Whether the study fits together"), std::string::npos);
   EXPECT_NE(page.find("Capture range"), std::string::npos);
+  EXPECT_NE(page.find("were refused and drawn again"), std::string::npos);
+  const nlohmann::json provenance =
+      nlohmann::json::parse(text("plain/run/summary.json")).at("provenance");
+  EXPECT_THAT(provenance.at("program_commit").get<std::string>(),
+              testing::MatchesRegex("[0-9a-f]+\\+?|unknown"));
 }
 
 TEST_F(EvaluateProgram, LeavesWhatTheReportLinksToBesideIt) {

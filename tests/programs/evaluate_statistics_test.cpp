@@ -241,7 +241,8 @@ TEST_F(HandBuiltResults, AreCountedBelowTheStatedThreshold) {
 
 TEST_F(HandBuiltResults, OfFewCasesComeWithAWarning) {
   const test::ProgramRun run = evaluate();
-  EXPECT_THAT(run.output, HasSubstr("4 cases: the bootstrap interval over cases is too narrow"));
+  EXPECT_THAT(run.output,
+              HasSubstr("4 patients: the bootstrap interval over patients is too narrow"));
   const json over = statistics()["over_cases"]["rate"];
   EXPECT_EQ(over["cases"], 4);
   EXPECT_EQ(over["is_optimistic"], true);
@@ -254,7 +255,7 @@ TEST_F(HandBuiltResults, OfFewCasesComeWithAWarning) {
   const test::ProgramRun one = evaluate("--case single");
   ASSERT_EQ(one.exit_code, 0) << one.output;
   EXPECT_THAT(one.output, HasSubstr("1 of 1 starts succeeded"));
-  EXPECT_THAT(one.output, HasSubstr("one case: "));
+  EXPECT_THAT(one.output, HasSubstr("one patient: "));
   EXPECT_TRUE(statistics()["over_cases"]["rate"]["low"].is_null());
   const test::ProgramRun none = evaluate("--case hopeless");
   ASSERT_EQ(none.exit_code, 0) << none.output;
@@ -353,6 +354,7 @@ TEST_F(HandBuiltResults, GiveAReportAlsoWhenNothingSucceeded) {
   ASSERT_EQ(run.exit_code, 0) << run.output;
   const std::string page = read_text_file(path("report.html"));
   EXPECT_NE(page.find("no pose for starts 0 to 19"), std::string::npos);
+  EXPECT_NE(page.find("The starts were given by a table"), std::string::npos);
   EXPECT_EQ(page.find(">nan"), std::string::npos);
 }
 
