@@ -19,36 +19,46 @@ struct Inflation {
   double growth;
 };
 
+/// What a pose is judged by: constants are of one kind each.
+enum class Evidence { Views, OneView, Silhouettes };
+
 struct InflationRow {
   const char* similarity;
-  bool in_silhouette;
+  Evidence evidence;
   Inflation pose;
   Inflation tre;
 };
 
-/// By `jobs/uncertainty.py`, on patients of odd numbers: the pose's at f8c8d8f, the TREs' at
-/// caf419aa; mi's is an earlier fit to cases of one phantom (docs/uncertainty.md). Within
+/// By `jobs/uncertainty.py`, on patients of odd numbers: with several views the pose's at f8c8d8f,
+/// the TREs' at caf419aa, mi's and those of one view at a902ce97 (docs/uncertainty.md). Within
 /// silhouettes on drawn bones of odd numbers (44ed6cd2), of which the pose explains nearly all:
-/// their growth is that over regions. The last row is for measures that were not fitted: the most
-/// cautious of them.
+/// their growth is that over regions. The last row is for what was not fitted: more cautious than
+/// all of them.
 constexpr std::array kInflation = {
-    InflationRow{"rg", false, {0.09, 2.95}, {-0.10, 1.05}},
-    InflationRow{"gc", false, {0.00, 1.90}, {-0.47, 1.00}},
-    InflationRow{"gc", true, {0.79, 1.90}, {0.77, 1.00}},
-    InflationRow{"mi", false, {2.50, 8.00}, {2.50, 8.00}},
-    InflationRow{"", false, {2.50, 8.00}, {2.50, 8.00}},
+    InflationRow{"rg", Evidence::Views, {0.09, 2.95}, {-0.10, 1.05}},
+    InflationRow{"gc", Evidence::Views, {0.00, 1.90}, {-0.47, 1.00}},
+    InflationRow{"mi", Evidence::Views, {1.97, 0.00}, {1.45, 0.00}},
+    InflationRow{"rg", Evidence::OneView, {0.90, 2.75}, {0.68, 0.00}},
+    InflationRow{"gc", Evidence::OneView, {1.15, 2.05}, {-0.09, 0.00}},
+    InflationRow{"mi", Evidence::OneView, {2.03, 0.30}, {0.77, 0.00}},
+    InflationRow{"gc", Evidence::Silhouettes, {0.79, 1.90}, {0.77, 1.00}},
+    InflationRow{"", Evidence::Views, {2.50, 8.00}, {2.50, 8.00}},
 };
 
-/// The coefficients of a logistic regression.
+/// The coefficients of a logistic regression on two features.
 struct Confidence {
   double at_once;
   double by_excess;
-  double by_log_tre;
+  double by_second;
 };
 
-/// Of success_confidence(), likewise, to the registrations of caf419aa, whose tables have the mean
-/// of the views' backgrounds alone (docs/uncertainty.md says how little that matters).
+/// Of success_confidence(), likewise, to registrations of several views by caf419aa, whose tables
+/// have the mean of the views' backgrounds alone (docs/uncertainty.md says how little that
+/// matters).
 constexpr Confidence kOverRegions{-2.46, 44.41, -0.88};
+/// Of one view, by its excess and the logarithm of that excess's part of the share: a predicted TRE
+/// says how little one view shows of depth, not whether the place is right.
+constexpr Confidence kOneView{-0.64, 41.22, 3.89};
 /// Of drawn bones of odd numbers (44ed6cd2), with the logarithm of the excess.
 constexpr Confidence kInSilhouettes{0.62, 4.23, -3.68};
 /// A smaller excess counts as this one there: a view that shows nothing leaves no confidence.
@@ -61,12 +71,14 @@ constexpr double kLeastShare = 0.05;
 constexpr double kNearMm = 0.1;
 constexpr double kFarMm = 20.0;
 
-bool are_in_silhouettes(std::span<const ViewValue> view_values) {
-  return !view_values.empty() && view_values.front().in_silhouette;
+Evidence evidence_of(std::span<const ViewValue> view_values) {
+  if (!view_values.empty() && view_values.front().in_silhouette) return Evidence::Silhouettes;
+  return view_values.size() == 1 ? Evidence::OneView : Evidence::Views;
 }
 
-double log_of_excess(double excess) {
-  return std::isfinite(excess) ? std::log(std::max(excess, kLeastExcess)) : excess;
+/// NaN stays NaN.
+double log_of_at_least(double value, double least) {
+  return std::isfinite(value) ? std::log(std::max(value, least)) : value;
 }
 
 double factor_of(const Inflation& inflation, double share) {
@@ -80,25 +92,34 @@ double factor_of(const Inflation& inflation, double share) {
 CovarianceInflation covariance_inflation(const std::string& similarity,
                                          std::span<const ViewValue> view_values) {
   const double share = summary_of(view_values, &ViewValue::fine).mean;
-  const bool in_silhouette = are_in_silhouettes(view_values);
+  const Evidence evidence = evidence_of(view_values);
   const auto* const row =
       std::find_if(kInflation.begin(), kInflation.end() - 1, [&](const InflationRow& candidate) {
-        return similarity == candidate.similarity && in_silhouette == candidate.in_silhouette;
+        return similarity == candidate.similarity && evidence == candidate.evidence;
       });
   return {factor_of(row->pose, share), factor_of(row->tre, share)};
 }
 
 double success_confidence(const ConfidenceFeatures& features) {
-  const double tre_mm = std::isfinite(features.sandwich_tre_mm)
-                            ? std::clamp(features.sandwich_tre_mm, kNearMm, kFarMm)
-                            : kFarMm;
-  const bool in_silhouettes = are_in_silhouettes(features.view_values);
-  const Confidence& by = in_silhouettes ? kInSilhouettes : kOverRegions;
   const double excess = explained_excess(features.view_values);
-  const double logit = by.at_once +
-                       by.by_excess * (in_silhouettes ? log_of_excess(excess) : excess) +
-                       by.by_log_tre * std::log(tre_mm);
-  return 1.0 / (1.0 + std::exp(-logit));
+  const double log_tre = std::log(std::isfinite(features.sandwich_tre_mm)
+                                      ? std::clamp(features.sandwich_tre_mm, kNearMm, kFarMm)
+                                      : kFarMm);
+  const auto by = [](const Confidence& constants, double first, double second) {
+    const double logit =
+        constants.at_once + constants.by_excess * first + constants.by_second * second;
+    return 1.0 / (1.0 + std::exp(-logit));
+  };
+  switch (evidence_of(features.view_values)) {
+    case Evidence::OneView: {
+      const double share = std::max(features.view_values.front().fine, kLeastShare);
+      return by(kOneView, excess, log_of_at_least(excess / share, kLeastExcess));
+    }
+    case Evidence::Silhouettes:
+      return by(kInSilhouettes, log_of_at_least(excess, kLeastExcess), log_tre);
+    default:
+      return by(kOverRegions, excess, log_tre);
+  }
 }
 
 }  // namespace af::registration

@@ -19,7 +19,8 @@ struct CovarianceInflation {
 
 /// Given the measure and the shares of the X-rays' gradients that the pose explains: content that
 /// no rigid pose explains, such as moved anatomy, shifts the optimum more than its scatter shows.
-/// NaN where nothing can be judged. \test Calibration.WidensWhatThePoseDoesNotExplain
+/// One view has constants of its own. NaN where nothing can be judged. \test
+/// Calibration.WidensWhatThePoseDoesNotExplain \test Calibration.WidensOneViewByItsOwnConstants
 CovarianceInflation covariance_inflation(const std::string& similarity,
                                          std::span<const ViewValue> view_values);
 
@@ -29,12 +30,15 @@ struct ConfidenceFeatures {
   double sandwich_tre_mm = 0.0;  ///< as predicted, before inflation; NaN counts as no prediction
 };
 
-/// Probability that the TRE is below 2.5 mm, by logistic regression on explained_excess(), of
-/// values within silhouettes its logarithm, and on the logarithm of the predicted TRE. NaN where
-/// there is no excess. A view that cannot be judged does not count. \test
+/// Probability that the TRE is below 2.5 mm, with one view that the mRPD is (its depth hardly
+/// shows): by logistic regression on explained_excess(), of values within silhouettes its
+/// logarithm, and on the logarithm of the predicted TRE; of one view on the excess and the
+/// logarithm of its part of the share. NaN where there is no excess. A view that cannot be judged
+/// does not count. \test
 /// Calibration.ConfidenceFallsWithEveryDoubt \test
 /// Calibration.AViewThatShowsNothingLeavesLittleConfidence \test
-/// Calibration.ConfidenceWithinSilhouettesFallsWithEveryDoubt
+/// Calibration.ConfidenceWithinSilhouettesFallsWithEveryDoubt \test
+/// Calibration.ConfidenceOfOneViewLooksAtWhatPosesBesideExplain
 double success_confidence(const ConfidenceFeatures& features);
 
 }  // namespace af::registration
