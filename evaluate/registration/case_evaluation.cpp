@@ -165,6 +165,7 @@ void add_result(const RegistrationResult& result,
   row.evaluations = result.evaluations;
   row.inadmissible = result.inadmissible;
   row.drr_count = result.drr_count;
+  row.chain = result.chain;
   row.stop_reason = to_string(result.stop_reason);
   row.seconds = result.seconds;
   row.is_corrected = result.correction.has_value();

@@ -78,6 +78,7 @@ registration::NamedCells cells_of(const RegistrationRow& row,
                                                  .stop_reason = row.stop_reason,
                                                  .inadmissible = row.inadmissible,
                                                  .drr_count = row.drr_count,
+                                                 .chain = row.chain,
                                                  .seconds = row.seconds};
   const RegistrationErrors& errors = row.errors;
   registration::NamedCells before_seconds = {

@@ -65,6 +65,7 @@ struct RegistrationRow {
   double chain_distance_mm = kMissing;
   double squared_distance = kMissing;  ///< Mahalanobis, of the error by the covariance
   InternedText stop_reason;
+  InternedText chain;    ///< whose end was taken
   InternedText error;    ///< message of a registration that threw
   double seconds = 0.0;  ///< wall time
 
@@ -94,6 +95,7 @@ struct RegistrationRow {
                     inadmissible,
                     drr_count,
                     stop_reason,
+                    chain,
                     error,
                     is_corrected,
                     correction,

@@ -41,6 +41,7 @@ NamedCells registration_row(const RegistrationCells& row,
   append(behind_stop_reason, cells);
   cells.emplace_back("inadmissible", std::to_string(row.inadmissible));
   cells.emplace_back("drr_count", std::to_string(row.drr_count));
+  cells.emplace_back("chain", row.chain);
   append(before_seconds, cells);
   cells.emplace_back("seconds", number_text(row.seconds));
   return cells;

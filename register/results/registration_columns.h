@@ -31,6 +31,7 @@ struct RegistrationCells {
   std::string stop_reason;
   std::int64_t inadmissible = 0;
   std::int64_t drr_count = 0;
+  std::string chain;  ///< of the method, whose end was taken; empty for other programs' poses
   double seconds = 0.0;
 };
 

@@ -228,6 +228,7 @@ json result_json(const RegistrationRecord& record,
   if (result.correction.has_value()) output["correction"] = correction_json(*result.correction);
   output["gold_source"] =
       record.errors.has_value() ? json(record.errors->gold_source) : json(nullptr);
+  output["chain"] = result.chain;
   output["trace"] = trace_json(result.trace);
   return output;
 }
@@ -253,6 +254,7 @@ NamedCells cells_of(const RegistrationRecord& record,
   row.stop_reason = to_string(result.stop_reason);
   row.inadmissible = result.inadmissible;
   row.drr_count = result.drr_count;
+  row.chain = result.chain;
   row.seconds = result.seconds;
   NamedCells before_seconds = {{"relative_to", "nominal"},
                                {"verdict", to_string(judgement_of(record).verdict)}};

@@ -48,6 +48,7 @@ TEST(RegistrationRows, TravelWithEveryBit) {
   sent.start_deg_mm = {0.1, -1.0 / 3, 1e-300, std::numeric_limits<double>::denorm_min(), 5, -0.0};
   sent.errors = {0.5, 1.0 / 3, 2.0, std::nan(""), 1e-300};
   sent.error = "numerics; \"failed\"\n";
+  sent.chain = "far";
   const RegistrationRow received =
       value_of<TracedRow>(bytes_of(TracedRow{sent, {}}), "journal").row;
   EXPECT_EQ(received.case_name, sent.case_name);
@@ -60,6 +61,7 @@ TEST(RegistrationRows, TravelWithEveryBit) {
   EXPECT_TRUE(std::isnan(received.errors.rotation_deg));
   EXPECT_EQ(received.errors.translation_mm, 1e-300);
   EXPECT_EQ(received.error, sent.error);
+  EXPECT_EQ(received.chain, "far");
   EXPECT_EQ(received.seconds, sent.seconds);
 }
 
@@ -568,6 +570,7 @@ TEST(RegisteredRow, MeasuresTheEndAgainstBothPoses) {
         result.room_from_ct = start;
         result.room_from_ct.translation() = Eigen::Vector3d(0, 0, 0.25);
         result.similarity = 1.5;
+        result.chain = "wide-edges";
         return result;
       },
       start_beside(4.0),
@@ -580,6 +583,7 @@ TEST(RegisteredRow, MeasuresTheEndAgainstBothPoses) {
   EXPECT_EQ(found.final_deg_mm[5], 0.25);
   EXPECT_EQ(found.errors.translation_mm, 0.25);
   EXPECT_EQ(found.errors.rotation_deg, 0.0);
+  EXPECT_EQ(registrations_table(Rows{found}).text(0, "chain"), "wide-edges");
 }
 
 TEST(RegisteredRow, OfARegistrationThatThrowsIsAFailure) {

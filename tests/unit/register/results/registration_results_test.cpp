@@ -19,6 +19,7 @@ RegistrationRecord record_of(std::int64_t start_index, double similarity) {
   RegistrationRecord record;
   record.start_index = start_index;
   record.result.similarity = similarity;
+  record.result.chain = "edges";
   record.result.room_from_ct = pose_from_parameters(
       PoseFrame(), PoseParameters::from_deg_and_mm({10.0, -20.0, 30.0, 1.0, 2.0, 3.0}));
   record.result.evaluations = 123;
@@ -111,6 +112,7 @@ TEST(ResultFiles, JsonTellsTheRunAndWritesNullForWhatDoesNotExist) {
   EXPECT_EQ(json.at("start_index"), 4);
   EXPECT_EQ(json.at("evaluations"), 123);
   EXPECT_EQ(json.at("stop_reason"), "step-below-final");
+  EXPECT_EQ(json.at("chain"), "edges");
   EXPECT_EQ(json.at("trace").at(0).at("step_mm"), 5.0);
   EXPECT_NEAR(json.at("parameters_relative_to_nominal").at("rotation_deg").at(1).get<double>(),
               -20.0,
