@@ -37,10 +37,10 @@ struct InflationRow {
 constexpr std::array kInflation = {
     InflationRow{"rg", Evidence::Views, {0.09, 2.95}, {-0.10, 1.05}},
     InflationRow{"gc", Evidence::Views, {0.00, 1.90}, {-0.47, 1.00}},
-    InflationRow{"mi", Evidence::Views, {1.97, 0.00}, {1.45, 0.00}},
-    InflationRow{"rg", Evidence::OneView, {0.90, 2.75}, {0.68, 0.00}},
-    InflationRow{"gc", Evidence::OneView, {1.15, 2.05}, {-0.09, 0.00}},
-    InflationRow{"mi", Evidence::OneView, {2.03, 0.30}, {0.77, 0.00}},
+    InflationRow{"mi", Evidence::Views, {1.75, 0.25}, {1.41, 0.00}},
+    InflationRow{"rg", Evidence::OneView, {0.89, 2.75}, {0.64, 0.00}},
+    InflationRow{"gc", Evidence::OneView, {1.06, 2.10}, {-0.08, 0.00}},
+    InflationRow{"mi", Evidence::OneView, {1.71, 1.35}, {0.77, 0.00}},
     InflationRow{"gc", Evidence::Silhouettes, {0.79, 1.90}, {0.77, 1.00}},
     InflationRow{"", Evidence::Views, {2.50, 8.00}, {2.50, 8.00}},
 };
@@ -58,7 +58,7 @@ struct Confidence {
 constexpr Confidence kOverRegions{-2.46, 44.41, -0.88};
 /// Of one view, by its excess and the logarithm of that excess's part of the share: a predicted TRE
 /// says how little one view shows of depth, not whether the place is right.
-constexpr Confidence kOneView{-0.64, 41.22, 3.89};
+constexpr Confidence kOneView{-1.59, 44.88, 3.28};
 /// Of drawn bones of odd numbers (44ed6cd2), with the logarithm of the excess.
 constexpr Confidence kInSilhouettes{0.62, 4.23, -3.68};
 /// A smaller excess counts as this one there: a view that shows nothing leaves no confidence.

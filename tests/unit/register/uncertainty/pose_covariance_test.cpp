@@ -168,10 +168,8 @@ TEST(Calibration, WidensWhatThePoseDoesNotExplain) {
     for (const double share : {0.9, 0.5, 0.3}) {
       const CovarianceInflation inflation =
           covariance_inflation(similarity, std::vector<ViewValue>{{0.8, share}, {0.8, share}});
-      EXPECT_GE(inflation.pose, last.pose) << similarity << ' ' << share;
+      EXPECT_GT(inflation.pose, last.pose) << similarity << ' ' << share;
       EXPECT_GE(inflation.tre, last.tre) << similarity << ' ' << share;
-      // What mi explains says nothing of how far beside its own optimum it ends.
-      EXPECT_EQ(inflation.pose > last.pose, similarity != std::string("mi") || last.pose == 0.0);
       EXPECT_GE(inflation.pose, 1.0);
       EXPECT_GE(inflation.pose, inflation.tre);
       last = inflation;
