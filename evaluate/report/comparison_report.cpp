@@ -51,6 +51,17 @@ std::string capture_cell(const json& renderer) {
          decimals(own.at("min_mm"), 0) + ")";
 }
 
+/// Runs of earlier versions counted gross failures by TRE alone.
+const json& gross_failures_of(const json& summary, const json& renderer) {
+  const bool by_mrpd = is_of_one_view(summary) && renderer.contains("mrpd_gross_failures");
+  return renderer.at(by_mrpd ? "mrpd_gross_failures" : "gross_failures");
+}
+
+std::string success_cell(const json& summary, const json& renderer) {
+  return is_of_one_view(summary) ? rate_with_interval(renderer.at("mrpd_success")) + " by mRPD"
+                                 : rate_with_interval(renderer);
+}
+
 std::string comparison_table(const std::vector<const EvaluationRun*>& runs) {
   HtmlTable table({{"Run", false},
                    {"Cases", false},
@@ -72,11 +83,11 @@ std::string comparison_table(const std::vector<const EvaluationRun*>& runs) {
                      element("span", method_title(renderer), "nowrap"),
                      search_text(run->summary, renderer),
                      plain(renderer.at("starts")),
-                     rate_with_interval(renderer),
+                     success_cell(run->summary, renderer),
                      decimals(renderer.at("tre_of_all_mm").at("median"), 2),
                      decimals(renderer.at("tre_of_all_mm").at("p95"), 2),
                      decimals(renderer.at("tre_of_successes_mm").at("mean"), 2),
-                     plain(renderer.at("gross_failures").at("successes")),
+                     plain(gross_failures_of(run->summary, renderer).at("successes")),
                      capture_cell(renderer),
                      seconds_text(number_of(renderer.at("seconds").at("median")))});
   return table.html();

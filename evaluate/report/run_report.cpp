@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluate/report/run_report.h"
 
+#include <algorithm>
+
 #include "evaluate/report/html_text.h"
 #include "files/output_file.h"
 
@@ -14,6 +16,13 @@ std::vector<const EvaluationRun*> runs_of(const std::vector<EvaluationRun>& runs
   for (const EvaluationRun& run : runs)
     if (run.kind == kind) result.push_back(&run);
   return result;
+}
+
+bool is_of_one_view(const json& summary) {
+  const json cases = summary.value("cases", json::array());
+  return !cases.empty() && std::all_of(cases.begin(), cases.end(), [](const json& of_case) {
+    return of_case.value("views", json()) == 1;
+  });
 }
 
 std::string method_name(const json& renderer) {

@@ -15,6 +15,10 @@ namespace af::evaluation {
 std::vector<const EvaluationRun*> runs_of(const std::vector<EvaluationRun>& runs,
                                           const std::string& kind);
 
+/// Whether every case of a registration run has one view: its ends are right by mRPD then, as one
+/// view shows no depth. false where the run does not say.
+bool is_of_one_view(const nlohmann::json& summary);
+
 /// "attenuation fields" or "ray casting" for our own renderers, else the method's name; text.
 std::string method_name(const nlohmann::json& renderer);
 

@@ -7,6 +7,7 @@
 #include "evaluate/outputs/sample_summary_json.h"
 #include "evaluate/report/html_text.h"
 #include "evaluate/report/number_html.h"
+#include "evaluate/report/run_report.h"
 #include "evaluate/report/sections_report.h"
 
 namespace af::evaluation {
@@ -45,9 +46,10 @@ double flawless_up_to_mm(const json& renderer) {
   return end_mm;
 }
 
-/// How far starts may lie; empty for a run of an earlier version, which meant another range.
-std::string capture_sentence(const json& renderer) {
-  const json& range = renderer.at("capture_range");
+/// How far starts may lie, by the range of all starts of that name; empty for a run of an earlier
+/// version, which meant another range.
+std::string capture_sentence(const json& renderer, const char* name = "capture_range") {
+  const json& range = renderer.at(name);
   if (!range.is_object() || !range.contains("ended_by")) return "";
   const json own = renderer.at("over_cases").value("capture_range_mm", json());
   if (own.is_object() && own.at("cases").get<std::int64_t>() > 1)
@@ -56,6 +58,23 @@ std::string capture_sentence(const json& renderer) {
            decimals(own.at("mean_mm"), 1) + " mm on average, " + decimals(own.at("min_mm"), 0) +
            " mm at worst.";
   return " Capture range: " + capture_text(range) + ".";
+}
+
+/// Of runs with one view, which shows no depth.
+std::string one_view_sentence(const json& renderer, double threshold_mm) {
+  const json& right = renderer.at("mrpd_success");
+  const auto starts = count_of(right.at("starts"));
+  const auto successes = count_of(right.at("successes"));
+  std::string text =
+      "With " + method_title(renderer) + " and one view, " + std::to_string(successes) + " of " +
+      counted(starts, "registration", "registrations") + " (" +
+      percent(number_of(right.at("rate"))) + ", 95 % interval " + interval_text(right) +
+      ") ended with a reprojection distance (mRPD) below " + decimals(threshold_mm, 1) + " mm";
+  if (successes == 0) return text + ".";
+  return text + "; of these it was " +
+         decimals(renderer.at("errors_of_successes").at("mrpd_mm").at("mean"), 2) +
+         " mm on average." + capture_sentence(renderer, "mrpd_capture_range") +
+         (successes == starts ? " None failed." : "");
 }
 
 std::string success_sentence(const json& renderer, double threshold_mm) {
@@ -91,11 +110,17 @@ std::string speed_sentence(const json& paired) {
          " times as long, on this computer.";
 }
 
+std::string sentence_of(const json& summary, const json& renderer) {
+  const double threshold_mm = summary.at("success_tre_mm").get<double>();
+  return is_of_one_view(summary) ? one_view_sentence(renderer, threshold_mm)
+                                 : success_sentence(renderer, threshold_mm);
+}
+
 std::string registration_sentences(const EvaluationRun& run) {
   const json& summary = run.summary;
   std::string items;
   for (const json& renderer : summary.at("renderers"))
-    items += element("li", success_sentence(renderer, summary.at("success_tre_mm").get<double>()));
+    items += element("li", sentence_of(summary, renderer));
   const std::string speed = speed_sentence(summary.at("field_against_raycast"));
   if (!speed.empty()) items += element("li", speed);
   return items;
@@ -106,9 +131,8 @@ std::string run_sentences(const EvaluationRun& run) {
   const json& summary = run.summary;
   return element("li",
                  "<b>" + escaped(run.name) + ":</b> " +
-                     success_sentence(summary.at("renderers").at(0),
-                                      summary.at("success_tre_mm").get<double>()) +
-                     " " + speed_sentence(summary.at("field_against_raycast")));
+                     sentence_of(summary, summary.at("renderers").at(0)) + " " +
+                     speed_sentence(summary.at("field_against_raycast")));
 }
 
 double median_psnr_db(const EvaluationRun& run) {
@@ -159,14 +183,19 @@ std::string gold_text(const json& renderer) {
 std::string registration_tiles(const EvaluationRun& run) {
   const json& renderers = run.summary.at("renderers");
   const json& first = renderers.at(0);
+  const bool by_mrpd = is_of_one_view(run.summary);
+  const json& rate = by_mrpd ? first.at("mrpd_success").at("rate") : first.at("rate");
+  const json& errors =
+      by_mrpd ? first.at("errors_of_successes").at("mrpd_mm") : first.at("tre_of_successes_mm");
+  const std::string which = by_mrpd ? " (mRPD)" : "";
   std::string tiles =
-      tile(percent(number_of(first.at("rate"))),
+      tile(percent(number_of(rate)),
            "",
-           "of starts succeed",
+           "of starts succeed" + which,
            method_title(first) + ", " + counted(count_of(first.at("starts")), "start", "starts")) +
-      tile(decimals(first.at("tre_of_successes_mm").at("mean"), 2),
+      tile(decimals(errors.at("mean"), 2),
            "mm",
-           "mean error of successes",
+           "mean error of successes" + which,
            method_title(first) + gold_text(first));
   for (const json& renderer : renderers) tiles += seconds_tile(renderer);
   return tiles;

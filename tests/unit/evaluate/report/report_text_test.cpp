@@ -9,6 +9,7 @@
 #include "base/error.h"
 #include "evaluate/outputs/failed_start.h"
 #include "evaluate/outputs/sample_summary_json.h"
+#include "evaluate/registration/registration_statistics.h"
 #include "evaluate/report/evaluation_run.h"
 #include "evaluate/report/html_text.h"
 #include "evaluate/report/number_html.h"
@@ -65,6 +66,34 @@ TEST(SummarySection, SaysWhichRunsHaveSimulatedXrays) {
                 "four), with"));
   for (EvaluationRun& run : runs) run.summary["simulation"] = json::object();
   EXPECT_THAT(summary_section(runs), HasSubstr("<strong>The X-rays are simulated</strong>, with"));
+}
+
+// Its TREs of 40 mm say nothing: the place is right.
+TEST(SummarySection, SaysOfOneViewWhatItsMrpdSays) {
+  RegistrationRow row;
+  row.case_name = "a";
+  row.renderer = "field";
+  row.initial_tre_mm = 3.0;
+  row.tre_mm = 40.0;
+  row.errors.mrpd_mm = 0.4;
+  row.has_one_view = true;
+  const std::vector<RegistrationRow> rows = {row};
+  const auto sentences = [&](int views) {
+    const EvaluationRun run{"",
+                            "registration",
+                            {{"simulation", nullptr},
+                             {"success_tre_mm", 2.5},
+                             {"cases", {{{"case", "a"}, {"views", views}}}},
+                             {"field_against_raycast", nullptr},
+                             {"renderers", {renderer_statistics(rows, "field", {})}}},
+                            "run"};
+    return summary_section({run});
+  };
+  EXPECT_THAT(sentences(1), HasSubstr("1 of 1 registration (100"));
+  EXPECT_THAT(sentences(1), HasSubstr("<div class=\"value\">100"));
+  EXPECT_THAT(sentences(1), HasSubstr("reprojection distance (mRPD) below 2.5 mm"));
+  EXPECT_THAT(sentences(2), HasSubstr("0 of 1 registration (0"));
+  EXPECT_THAT(sentences(2), HasSubstr("<div class=\"value\">0\xC2\xA0%"));
 }
 
 TEST(RepeatCommand, NamesTheStartAndKeepsBothRenderersWhereRayCastingDependsOnFields) {
