@@ -25,7 +25,9 @@ from attenuation_fields.errors import FileError
 Path = Union[str, "os.PathLike[str]"]
 Column = Union[NDArray[np.float64], NDArray[np.str_]]
 
-_TEXT_COLUMNS = frozenset(["case", "renderer", "relative_to", "stop_reason", "verdict", "error"])
+_TEXT_COLUMNS = frozenset(
+    ["case", "renderer", "relative_to", "stop_reason", "chain", "verdict", "error"]
+)
 
 
 @dataclass(frozen=True)

@@ -479,6 +479,7 @@ class ResultsTest(unittest.TestCase):
         self.assertEqual(columns["tre_mm"].dtype, np.float64)
         self.assertEqual(list(columns["case"]), ["ellipsoids"] * 2)
         self.assertEqual(list(columns["start_index"]), [0.0, 1.0])
+        self.assertEqual(list(columns["chain"]), ["fast"] * 2)
 
     def test_rows_of_af_evaluate_are_read(self):
         folder = Path(__file__).resolve().parents[1] / "fuzz" / "runs" / "registration"
