@@ -58,6 +58,19 @@ PopulationCounting counting_of(const EvaluationRun& run, std::uint64_t seed) {
   }
 }
 
+/// Runs of earlier versions do not say.
+std::string commit_of(const EvaluationRun& run) {
+  try {
+    return run.summary.value("provenance", nlohmann::json::object())
+        .value("program_commit", "unknown");
+  } catch (const nlohmann::json::exception&) {
+    throw FileError((run.folder / "summary.json").string(),
+                    "provenance",
+                    "program_commit, a text",
+                    "something else");
+  }
+}
+
 }  // namespace
 
 void PopulationReader::read(const std::string& condition) {
@@ -70,8 +83,7 @@ void PopulationReader::read(const std::string& condition) {
   for (const EvaluationRun& run : find_runs({condition.substr(equals + 1)})) {
     if (run.kind != "registration") continue;
     check_counting(run);
-    commits.insert(run.summary.value("provenance", nlohmann::json::object())
-                       .value("program_commit", "unknown"));
+    commits.insert(commit_of(run));
     run.read_in_parts("registrations.csv", [&](const CsvTable& part) {
       add_population_rows(part, run.folder, run_of_case, found);
     });

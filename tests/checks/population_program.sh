@@ -126,5 +126,8 @@ refuse 4 'is not a folder of results' "${evaluate[@]}" --condition clean-2-fast=
 mkdir twice
 cp -r pop/runs/clean-2-fast twice/first
 cp -r pop/runs/clean-2-fast twice/copy
+cp -r pop/runs/clean-2-fast damaged-summary
+sed -i 's/"program_commit": "[^"]*"/"program_commit": 5/' damaged-summary/spine-001/summary.json
+refuse 4 'program_commit, a text' "${evaluate[@]}" --condition clean-2-fast=damaged-summary
 refuse 3 'must not have case spine-001-p1, which .* has, too' "${evaluate[@]}" --condition clean-2-fast=twice
 [[ ! -e refused ]] || fail "a refused table left $(find refused)"
