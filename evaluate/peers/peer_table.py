@@ -44,6 +44,7 @@ def entries_of(folder, case, method):
         # A start without a pose stays in the denominator, unless the peer was not given it.
         mine = [row for row in rows if row["renderer"] == renderer and (given is None or int(row["start_index"]) in given)]
         tres = [tre for tre in numbers(mine, "tre_mm") if tre < SUCCESS_TRE_MM]
+        seconds = numbers(mine, "seconds")
         entries.append(
             {
                 "case": case,
@@ -52,7 +53,7 @@ def entries_of(folder, case, method):
                 "starts": len(mine),
                 "successes": len(tres),
                 "median_tre_mm": statistics.median(tres) if tres else math.nan,
-                "median_seconds": statistics.median(numbers(mine, "seconds")) if numbers(mine, "seconds") else math.nan,
+                "median_seconds": statistics.median(seconds) if seconds else math.nan,
                 "precompute_seconds": field_seconds(folder, case) if renderer == "field" else 0.0,
             }
         )

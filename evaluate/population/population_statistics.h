@@ -51,8 +51,8 @@ struct PatientSuccess {
   std::int64_t starts = 0;
   std::int64_t successes = 0;
   ProportionInterval wilson;
-  /// Without an interval: two or three starts per interval of initial TRE do not tell a rate of 95
-  /// % from others, so that what a patient's own starts leave plausible begins at 0.
+  /// Without an interval: two or three starts per interval of initial TRE hardly tell success rates
+  /// apart, so that what a patient's own starts leave plausible begins at 0.
   CaptureRange capture;
 };
 

@@ -191,15 +191,18 @@ json renderer_statistics(std::span<const RegistrationRow> rows,
                          const StatisticsOptions& options) {
   RowPointers mine;
   std::map<std::string, RowPointers> by_case;
-  std::map<std::string, RowPointers> by_patient;
   std::vector<double> stated_pose_tre_mm;
   for (const RegistrationRow& row : rows) {
     if (row.renderer != renderer) continue;
     mine.push_back(&row);
     by_case[row.case_name].push_back(&row);
-    by_patient[patient_of_case(row.case_name)].push_back(&row);
     if (row.is_success(options.success_tre_mm) && std::isfinite(row.stated_pose_tre_mm))
       stated_pose_tre_mm.push_back(row.stated_pose_tre_mm);
+  }
+  std::map<std::string, RowPointers> by_patient;
+  for (const auto& [name, case_rows] : by_case) {
+    RowPointers& patient_rows = by_patient[patient_of_case(name)];
+    patient_rows.insert(patient_rows.end(), case_rows.begin(), case_rows.end());
   }
   json result = statistics_of(mine, options);
   result["renderer"] = renderer;
