@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whether registrations know their own errors: fits the constants of register/uncertainty/calibration.cpp to the
 registrations of a population study (jobs/population.sh, jobs/bones.sh), whose truth is known, on the patients of odd
-numbers, and prints how well they do on the others. Patients that were not drawn, which have no number, are never fitted.
-Needs nothing but Python."""
+numbers, and prints how well they do on the others; with --folds to all drawn patients, each judged by constants that
+patients of other folds gave. Patients that were not drawn, which have no number, are never fitted. Needs nothing but
+Python."""
 import argparse
 import csv
 import hashlib
@@ -41,7 +42,8 @@ class Row:
         self.case = f"{cells['case']} {variant}"
         self.patient = re.sub(r"-p\d+$", "", cells["case"])
         drawn = re.fullmatch(r"(?:spine|pelvis|head|bone)-(\d{3,})-p\d+", cells["case"])
-        self.is_for_fit = drawn is not None and int(drawn[1]) % 2 == 1
+        self.number = int(drawn[1]) if drawn else None
+        self.is_for_fit = drawn is not None and self.number % 2 == 1
         self.half = "real" if drawn is None else "odd" if self.is_for_fit else "even"
         self.tre = number("tre_mm")
         self.is_success = (self.tre if views > 1 else number("mrpd_mm")) < SUCCESS_MM
@@ -291,30 +293,62 @@ def reliability(rows):
     return lines
 
 
-def fit(rows, measures):
-    """Prints the constants that fit the rows that are for it, and has all rows foretold by them."""
-    evidence, confidence = names_of(measures, rows[0].views)
+def fitted_constants(rows, measures):
+    """Those of the covariance and of TREs by measure, and those of the confidence, that fit these rows."""
+    inflations = {}
     for measure in measures:
-        mine = [r for r in rows if r.measure == measure]
-        fitted = [r for r in mine if r.is_for_fit and r.is_success and not math.isnan(r.distance)]
+        fitted = [r for r in rows if r.measure == measure and r.is_success and not math.isnan(r.distance)]
         if not fitted:
-            refuse(measure, "no registration of a patient of odd number succeeded and says how far it may be off; --judge fits nothing")
+            refuse(measure, "no registration of a patient to fit succeeded and says how far it may be off; --judge fits nothing")
         # Never less than the sandwich itself, which holds where the pose explains the X-rays. A TRE adds up what all six
         # directions do, and may be foretold too large.
         pose = fit_inflation(fitted, [row.distance / REGION_95 for row in fitted], 0.0)
         tre = fit_inflation(fitted, [(row.tre / row.tre_95) ** 2 for row in fitted], -math.inf)
+        inflations[measure] = (pose, tre)
+    return inflations, fit_confidence([row for row in rows if row.has_confidence])
+
+
+def print_constants(constants, views):
+    """As lines of calibration.cpp."""
+    inflations, coefficients = constants
+    evidence, confidence = names_of(list(inflations), views)
+    for measure, (pose, tre) in inflations.items():
         name = measure.removesuffix(" in silhouettes")
         print(f'    InflationRow{{"{name}", Evidence::{evidence}, {constants_text(pose)}, {constants_text(tre)}}},')
-        for row in mine:
-            if row.has_pose:
-                row.inflation = inflation_of(row, pose)
-                row.tre_inflation = inflation_of(row, tre)
-    coefficients = fit_confidence([row for row in rows if row.is_for_fit and row.has_confidence])
     print(f"constexpr Confidence {confidence}{constants_text(coefficients)};")
+
+
+def foretell(rows, constants):
+    inflations, coefficients = constants
     for row in rows:
+        pose, tre = inflations[row.measure]
+        if row.has_pose:
+            row.inflation = inflation_of(row, pose)
+            row.tre_inflation = inflation_of(row, tre)
         # Ends that the verdict calls not found have none, whatever the constants.
         if row.has_confidence and row.stated_confidence != 0.0:
             row.confidence = probability(coefficients, row.features())
+
+
+def fit_to_odd_half(rows, measures):
+    constants = fitted_constants([row for row in rows if row.is_for_fit], measures)
+    print_constants(constants, rows[0].views)
+    foretell(rows, constants)
+
+
+def cross_validate(rows, measures, folds):
+    """Prints the constants that fit all drawn patients. Each of them is foretold by those of the others: every fold has the
+    patients whose numbers leave the same rest; patients that were not drawn are foretold by the constants of all."""
+    drawn = [row for row in rows if row.number is not None]
+    constants = fitted_constants(drawn, measures)
+    print_constants(constants, rows[0].views)
+    foretell([row for row in rows if row.number is None], constants)
+    for fold in range(folds):
+        mine = [row for row in drawn if row.number % folds == fold]
+        if mine:
+            foretell(mine, fitted_constants([row for row in drawn if row.number % folds != fold], measures))
+    for row in rows:
+        row.is_for_fit = False
 
 
 def take_as_stated(rows):
@@ -322,6 +356,13 @@ def take_as_stated(rows):
         row.is_for_fit = False
         row.inflation, row.tre_inflation = row.stated_inflation, row.stated_tre_inflation
         row.confidence = row.stated_confidence
+
+
+def fold_count(text):
+    count = int(text) if text.isdecimal() else 0
+    if count < 2:
+        raise argparse.ArgumentTypeError(f"'{text}': must be a whole number of at least 2")
+    return count
 
 
 def options():
@@ -332,7 +373,10 @@ def options():
     parser.add_argument("--presets", default="robust,fast", help="comma separated [%(default)s]")
     parser.add_argument("--variants", default="clean,all", help="comma separated, as in the population [%(default)s]")
     parser.add_argument("--views", type=int, choices=(1, 2), default=2, help="of the registrations; one view has constants of its own [%(default)s]")
-    parser.add_argument("--judge", action="store_true", help="fit nothing: judge all patients by what the programs foretold")
+    how = parser.add_mutually_exclusive_group()
+    how.add_argument("--judge", action="store_true", help="fit nothing: judge all patients by what the programs foretold")
+    how.add_argument("--folds", type=fold_count, metavar="K",
+                     help="fit to all drawn patients, and judge each by what the patients of the other K - 1 folds give")
     parser.add_argument("--csv", metavar="FILE", help="the table, as CSV")
     parser.add_argument("--commit", metavar="HASH",
                         help="last columns of it: the commit of the programs, and 16 digits of the SHA-256 of all tables read")
@@ -443,8 +487,11 @@ def main():
     if chosen.judge:
         take_as_stated(rows)
         halves = {"all, as stated": False}
+    elif chosen.folds:
+        cross_validate(rows, measures, chosen.folds)
+        halves = {f"all, {chosen.folds} folds": False}
     else:
-        fit(rows, measures)
+        fit_to_odd_half(rows, measures)
         halves = {"odd, fitted": True, "even, judged": False}
     table = tables_of(rows, measures, halves)
     if chosen.judge:

@@ -29,18 +29,17 @@ struct InflationRow {
   Inflation tre;
 };
 
-/// By `jobs/uncertainty.py`, on patients of odd numbers: with several views the pose's at f8c8d8f,
-/// the TREs' at caf419aa, mi's and those of one view at a902ce97 (docs/uncertainty.md). Within
-/// silhouettes on drawn bones of odd numbers (44ed6cd2), of which the pose explains nearly all:
-/// their growth is that over regions. The last row is for what was not fitted: more cautious than
-/// all of them.
+/// By `jobs/uncertainty.py --folds`, on patients 1001 to 1060 (a902ce97; docs/uncertainty.md).
+/// Within silhouettes on drawn bones of odd numbers (44ed6cd2), of which the pose explains nearly
+/// all: their growth is that over regions. The last row is for what was not fitted: more cautious
+/// than all of them.
 constexpr std::array kInflation = {
-    InflationRow{"rg", Evidence::Views, {0.09, 2.95}, {-0.10, 1.05}},
-    InflationRow{"gc", Evidence::Views, {0.00, 1.90}, {-0.47, 1.00}},
-    InflationRow{"mi", Evidence::Views, {1.75, 0.25}, {1.41, 0.00}},
-    InflationRow{"rg", Evidence::OneView, {0.89, 2.75}, {0.64, 0.00}},
-    InflationRow{"gc", Evidence::OneView, {1.06, 2.10}, {-0.08, 0.00}},
-    InflationRow{"mi", Evidence::OneView, {1.71, 1.35}, {0.77, 0.00}},
+    InflationRow{"rg", Evidence::Views, {0.41, 1.75}, {-0.08, 0.90}},
+    InflationRow{"gc", Evidence::Views, {0.00, 1.90}, {-0.60, 0.85}},
+    InflationRow{"mi", Evidence::Views, {1.72, 0.35}, {1.38, 0.00}},
+    InflationRow{"rg", Evidence::OneView, {0.70, 3.15}, {0.49, 0.00}},
+    InflationRow{"gc", Evidence::OneView, {0.61, 2.45}, {0.15, 0.00}},
+    InflationRow{"mi", Evidence::OneView, {1.66, 0.90}, {0.79, 0.00}},
     InflationRow{"gc", Evidence::Silhouettes, {0.79, 1.90}, {0.77, 1.00}},
     InflationRow{"", Evidence::Views, {2.50, 8.00}, {2.50, 8.00}},
 };
@@ -52,13 +51,11 @@ struct Confidence {
   double by_second;
 };
 
-/// Of success_confidence(), likewise, to registrations of several views by caf419aa, whose tables
-/// have the mean of the views' backgrounds alone (docs/uncertainty.md says how little that
-/// matters).
-constexpr Confidence kOverRegions{-2.46, 44.41, -0.88};
+/// Of success_confidence(), likewise, to the ends of `robust` and `fast`.
+constexpr Confidence kOverRegions{-3.10, 51.13, -1.08};
 /// Of one view, by its excess and the logarithm of that excess's part of the share: a predicted TRE
 /// says how little one view shows of depth, not whether the place is right.
-constexpr Confidence kOneView{-1.59, 44.88, 3.28};
+constexpr Confidence kOneView{-1.10, 48.14, 3.81};
 /// Of drawn bones of odd numbers (44ed6cd2), with the logarithm of the excess.
 constexpr Confidence kInSilhouettes{0.62, 4.23, -3.68};
 /// A smaller excess counts as this one there: a view that shows nothing leaves no confidence.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the measured registrations of jobs/uncertainty.py say of predictions: constants that are
-// fitted on one half of the cases and judged on the other (docs/uncertainty.md).
+// fitted to some patients and judged on others (docs/uncertainty.md).
 #pragma once
 
 #include <span>

@@ -70,6 +70,16 @@ awk -F, -v OFS=, 'NR == 1 { for (i = 1; i <= NF; ++i) if ($i == "tre_mm") tre = 
   pop/runs/clean-2-fast/spine-001/registrations.csv >right/runs/clean-2-fast/spine-001/registrations.csv
 "${uncertainty[@]}" right >fitted 2>err || fail "uncertainty.py: $(cat err)"
 grep -q '^constexpr Confidence kOverRegions{' fitted || fail "uncertainty.py fitted $(cat fitted)"
+# By folds: a second patient, whom the first one's constants foretell. One patient alone leaves nothing to fit.
+sed 's/^spine-001/spine-002/' right/runs/clean-2-fast/spine-001/registrations.csv >second.csv
+cp -r right two-patients
+cp -r two-patients/runs/clean-2-fast/spine-001 two-patients/runs/clean-2-fast/spine-002
+cp second.csv two-patients/runs/clean-2-fast/spine-002/registrations.csv
+"${uncertainty[@]}" two-patients --folds 2 >fitted 2>err || fail "uncertainty.py --folds: $(cat err)"
+grep -q '^constexpr Confidence kOverRegions{' fitted || fail "uncertainty.py --folds fitted $(cat fitted)"
+grep -q '^measure gc  half all, 2 folds  cases 2 ' fitted || fail "uncertainty.py --folds judged $(cat fitted)"
+refuse 4 'no registration of a patient to fit' "${uncertainty[@]}" right --folds 2
+refuse 2 'must be a whole number of at least 2' "${uncertainty[@]}" right --folds 1
 prefix/libexec/attenuation-fields/jobs/bones.sh --output bones --bones 1 --intervals 3 --ranks 2 >out 2>err || fail "bones.sh: $(cat out err)"
 grep -q '^clean-2-bone,all,1,3,' bones/tables/population.csv || fail "bones.sh wrote $(cat bones/tables/population.csv)"
 prefix/libexec/attenuation-fields/jobs/uncertainty.py bones --presets bone --variants clean >fitted 2>err || fail "uncertainty.py: $(cat err)"
@@ -114,7 +124,7 @@ for damage in 's/,squared_distance//' '2s/,.*//' "2,\$d" 's/^spine-001/spine-002
   rm -rf damaged
   cp -r pop damaged
   sed -i "$damage" damaged/runs/clean-2-fast/spine-001/registrations.csv
-  refuse 4 'squared_distance\|is cut off\|holds no registration\|odd number' "${uncertainty[@]}" damaged
+  refuse 4 'squared_distance\|is cut off\|holds no registration\|of a patient to fit' "${uncertainty[@]}" damaged
 done
 
 evaluate=("$programs/af-evaluate" population -o refused)
