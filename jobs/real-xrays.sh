@@ -19,7 +19,7 @@ and by ray casting. All but paper register again by fields with a finish by ray 
 with the finish's steps (0.5 mm instead of 1). Writes methods.md, finishes.md, distances.md and report.html. After a
 stop, run the same command again to continue. Needs the programs in build/release/bin (or installed).
 
-  --scan FILE               geometry of the scan (af-scan --help)        [FOLDER/scan.toml, else docs/data/cbct-cylinder.toml]
+  --scan FILE               geometry of the scan: af-inspect --template scan prints one to fill in        [FOLDER/scan.toml]
   --output DIR              where everything goes                                                      [./real-xrays]
   --pairs N                 pairs of X-rays; the first of each is a case of one view, too                         [5]
   --presets LIST            comma separated                                                       [robust,fast,paper]
@@ -27,7 +27,7 @@ stop, run the same command again to continue. Needs the programs in build/releas
   --intervals N             intervals of 2 mm, from 0                                                            [15]
   --raycast-starts N        of each interval's starts, so many also by ray casting, with both steps; 0: no ray casting, and
                             no finish                                                                            [1]
-  --calibration OPTIONS     options of af-scan, in one word, e.g. "--focal-share 0" for a distance that was measured
+  --calibration OPTIONS     options of af-scan, in one word, e.g. "--as-stated" for a calibrated scanner
   --field OPTIONS           options of af-precompute, in one word                                 [--preset standard]
   --max-rotation-deg X      range of the fields, degrees                                                         [16]
   --max-translation-mm X    range of the fields, mm                                                              [40]
@@ -66,7 +66,10 @@ done
 [[ -d "$folder" ]] || die 4 "$folder: no such folder"
 if [[ -z "$scan" ]]; then
   scan="$folder/scan.toml"
-  [[ -f "$scan" ]] || scan="$af_root/docs/data/cbct-cylinder.toml"
+  # The scan that the documentation measures comes without a file of ours.
+  cylinder="$af_root/docs/data/cbct-cylinder.toml"
+  [[ -f "$scan" || ! -f "$folder/Projection359.png" || ! -f "$cylinder" ]] || scan=$cylinder
+  [[ -f "$scan" ]] || die 4 "$scan: no such file; give --scan FILE (af-inspect --template scan prints one to fill in)"
 fi
 [[ -f "$scan" ]] || die 4 "--scan $scan: no such file"
 folder=$(realpath "$folder") scan=$(realpath "$scan")
@@ -82,7 +85,13 @@ mkdir -p "$output/fields" "$output/starts" "$output/runs" "$output/finishes"
 
 # --- the scan ----------------------------------------------------------------------------------------------------
 
+say "Geometry of the scan: $scan"
+# Lists of angles and of files stand beside the scan's file.
+lists=$(sed -nE 's/^ *(angles|files)_file *= *"([^"]*)".*/\2/p' "$scan")
 stage_inputs="$(sha256sum <"$scan") $(state_of "$folder")"
+while IFS= read -r list; do
+  [[ -z "$list" ]] || stage_inputs+=" $(cd "$(dirname "$scan")" && sha256sum <"$list")"
+done <<<"$lists"
 study="$output/study/study.toml"
 stage "scan" "$study" "$bin/af-scan" --scan "$scan" --folder "$folder" --pairs "$pairs" --seed "$seed" --enlarge-small \
   "${scan_options[@]}" --force -o "$output/study"
@@ -154,5 +163,6 @@ if ((${#finish_folders[@]} > 0)); then
   say "Tables: $output/finishes.md, $output/distances.md"
 fi
 "$bin/af-evaluate" report -o "$output/report.html" "$output/runs"
-grep -E '^(enlarged|(gold|stated)_residual)' "$output/study/calibration.toml" | sed 's/^/  /'
+grep -E '^(enlarged|(gold|stated)_residual|(stated_)?source_to_detector_mm)' "$output/study/calibration.toml" | sed 's/^/  /'
+grep '^Warning' "$output/logs/scan.log" | sed 's/^/  /' || true
 say "Report: $output/report.html; pictures of the X-rays: $output/study/view-*.png"

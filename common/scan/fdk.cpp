@@ -11,6 +11,7 @@
 #include "base/plausible.h"
 #include "geometry/point_projector.h"
 #include "scan/image_sampling.h"
+#include "volume/attenuation_volume.h"
 
 namespace af {
 
@@ -325,6 +326,30 @@ double reference_mu_per_mm(const MuVolume& volume) {
   std::nth_element(inside.begin(), at, inside.end());
   if (!(*at > 0.0F)) throw InputError("the reconstruction is empty: no view attenuates");
   return 0.5 * static_cast<double>(*at);
+}
+
+double light_share(const MuVolume& volume, double cut_mu_per_mm) {
+  double light = 0.0;
+  double all = 0.0;
+  for (const float mu : volume.mu_per_mm) {
+    const auto value = static_cast<double>(mu);
+    if (value < cut_mu_per_mm) light += value;
+    all += value;
+  }
+  return all > 0.0 ? std::max(0.0, light) / all : 0.0;
+}
+
+double registration_water_mu_per_mm(const MuVolume& volume) {
+  constexpr double kMostLight = 0.05;
+  constexpr double kAirOfWater = 1.0 + AttenuationModel{}.air_below_hu / 1000.0;
+  constexpr double kMostOfWater = 33.0;  // of 16-bit HU
+  const double densest =
+      static_cast<double>(*std::max_element(volume.mu_per_mm.begin(), volume.mu_per_mm.end()));
+  double water = reference_mu_per_mm(volume);
+  while (light_share(volume, kAirOfWater * water) > kMostLight &&
+         0.5 * water * kMostOfWater > densest)
+    water *= 0.5;
+  return water;
 }
 
 }  // namespace af

@@ -56,4 +56,14 @@ CtVolume ct_of(const MuVolume& volume, double mu_water_per_mm);
 /// scale it keeps every material of a scan within the scale, whatever the scan's energy.
 double reference_mu_per_mm(const MuVolume& volume);
 
+/// The share of all attenuation that lies in voxels below `cut_mu_per_mm`. Noise about 0 does not
+/// count: what is negative is taken off again.
+double light_share(const MuVolume& volume, double cut_mu_per_mm);
+
+/// The water of the HU scale of a CT to register: reference_mu_per_mm(), halved until the voxels
+/// that AttenuationModel takes for air hold at most 5 % of the attenuation. Little metal in much
+/// plastic would make air of the plastic. Never so low that the densest voxels leave the scale.
+/// \test LightShare.KeepsPlasticBesideMetal
+double registration_water_mu_per_mm(const MuVolume& volume);
+
 }  // namespace af

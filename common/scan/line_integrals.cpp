@@ -238,6 +238,22 @@ void refuse_shadow_at_one_side(const LinesAcross& lines,
                          std::string(kGiveFlat));
 }
 
+/// Whether pixels that see air vary from view to view far less than the other lit ones, which the
+/// object passes.
+bool is_steadier_in_air(const PixelStatistics& statistics, const AirLevel& level) {
+  std::vector<float> in_air;
+  std::vector<float> elsewhere;
+  for (std::size_t i = 0; i < level.is_lit.size(); ++i) {
+    if (level.is_lit[i] == 0) continue;
+    const float variation =
+        statistics.deviation.pixels[i] / std::max(statistics.mean.pixels[i], 1e-6F);
+    (level.is_air[i] != 0 ? in_air : elsewhere).push_back(variation);
+  }
+  if (in_air.empty() || elsewhere.empty()) return false;
+  constexpr float kMuchSteadier = 0.25F;
+  return percentile(std::move(in_air), 0.5) < kMuchSteadier * percentile(std::move(elsewhere), 0.5);
+}
+
 std::size_t count_of(const std::vector<unsigned char>& flags) {
   return static_cast<std::size_t>(std::accumulate(flags.begin(), flags.end(), std::size_t{0}));
 }
@@ -318,24 +334,22 @@ AirLevel air_level_of_flat(const Image2d& flat, const PixelStatistics& statistic
     ratios[i] = static_cast<double>(statistics.mean.pixels[i] / flat.pixels[i]);
   }
   // The tube may have given somewhat less than for the flat, or more: the brightest ratios are
-  // those of air. Below that no pixel sees air, and the beam is taken to be the flat's.
-  constexpr double kLeastOpen = 0.75;
+  // those of air.
+  constexpr double kSameExposure = 0.1;
   std::vector<float> lit;
   for (std::size_t i = 0; i < ratios.size(); ++i)
     if (level.is_lit[i] != 0) lit.push_back(static_cast<float>(ratios[i]));
   if (lit.empty()) throw InputError("flat", "all dark", "must show the open beam");
   const auto open = static_cast<double>(percentile(std::move(lit), 0.98));
-  if (open < kLeastOpen) return level;
   for (std::size_t i = 0; i < ratios.size(); ++i)
     if (level.is_lit[i] != 0 && std::abs(ratios[i] - open) <= kSameAsFlat * open)
       level.is_air[i] = 1;
+  if (std::abs(open - 1.0) > kSameExposure && !is_steadier_in_air(statistics, level))
+    std::fill(level.is_air.begin(), level.is_air.end(), 0);
   return level;
 }
 
-Image2d line_integrals_of(const Image2d& counts,
-                          const AirLevel& level,
-                          AxisAlong axis_along,
-                          double least_count) {
+double beam_of(const Image2d& counts, const AirLevel& level) {
   double air = 0.0;
   double seen = 0.0;
   for (std::size_t i = 0; i < counts.pixels.size(); ++i)
@@ -343,7 +357,25 @@ Image2d line_integrals_of(const Image2d& counts,
       seen += static_cast<double>(counts.pixels[i]);
       air += static_cast<double>(level.air.pixels[i]);
     }
-  const double beam = air > 0.0 && seen > 0.0 ? seen / air : 1.0;
+  return air > 0.0 && seen > 0.0 ? seen / air : 1.0;
+}
+
+double least_count_of(const AirLevel& level) {
+  constexpr double kFewestCounts = 50.0;
+  constexpr double kLeastTransmission = 1e-5;
+  std::vector<float> lit;
+  for (std::size_t i = 0; i < level.is_lit.size(); ++i)
+    if (level.is_lit[i] != 0) lit.push_back(level.air.pixels[i]);
+  check(!lit.empty(), "an air level without lit pixels");
+  const auto air = static_cast<double>(percentile(std::move(lit), 0.5));
+  return air < kFewestCounts ? kLeastTransmission * air : 0.5;
+}
+
+Image2d line_integrals_of(const Image2d& counts,
+                          const AirLevel& level,
+                          AxisAlong axis_along,
+                          double least_count) {
+  const double beam = beam_of(counts, level);
   Image2d result(counts.width, counts.height);
   for (std::size_t i = 0; i < counts.pixels.size(); ++i) {
     const double count = std::max(least_count, static_cast<double>(counts.pixels[i]));

@@ -37,15 +37,23 @@ PixelStatistics pixel_statistics(const std::vector<const Image2d*>& images);
 AirLevel estimated_air_level(const PixelStatistics& statistics, AxisAlong axis_along);
 
 /// The air level of a flat image (counts above dark). Pixels that see air are found from the scan's
-/// statistics: those whose share of the flat is within 5 % of the brightest, if that is at least
-/// 0.75. An object that reaches beyond the detector leaves no air; then the beam is taken to be the
-/// flat's.
+/// statistics: those whose share of the flat is within 5 % of the brightest, if that is within 0.9
+/// and 1.1, or if they vary from view to view far less than the others do: the flat may be of
+/// another exposure. An object that reaches beyond the detector leaves no air; then the beam is
+/// taken to be the flat's. \test LineIntegrals.FromAFlatOfAnotherExposureAreThoseOfTheObject
 AirLevel air_level_of_flat(const Image2d& flat, const PixelStatistics& statistics);
 
-/// -log(counts / (air * beam)), where `beam` is this view's mean ratio of counts to air over the
-/// pixels that see air: the tube's output changes from view to view. Pixels behind the aperture get
-/// the value of the nearest lit pixel of their line across the axis. Counts below `least_count`
-/// are taken as that. \test LineIntegrals.AreThoseOfTheObjectUnderStripesAndDrift
+/// A view's mean ratio of counts to air over the pixels that see air: the tube's output changes
+/// from view to view. 1 where no pixel sees air.
+double beam_of(const Image2d& counts, const AirLevel& level);
+
+/// What a pixel without any counts stands for under the logarithm: half a count; where the open
+/// beam has less than 50, so that numbers are no counts (transmissions of 0 to 1), 1e-5 of it.
+double least_count_of(const AirLevel& level);
+
+/// -log(counts / (air * beam_of(counts))). Pixels behind the aperture get the value of the nearest
+/// lit pixel of their line across the axis. Counts below `least_count` are taken as that. \test
+/// LineIntegrals.AreThoseOfTheObjectUnderStripesAndDrift
 Image2d line_integrals_of(const Image2d& counts,
                           const AirLevel& level,
                           AxisAlong axis_along,

@@ -27,6 +27,8 @@ struct CircularScan {
   /// middle.
   std::optional<Eigen::Vector2d> beam_foot_px;
   std::vector<double> angles_rad;  ///< of the views
+  /// The stated distance from source to detector may be off by this share of it; 0: measured.
+  double distance_tolerance = 0.0;
 
   /// The scan as seen by pixels `factor` times as wide and high; columns and rows that fill no
   /// coarse pixel are left out. InputError when fewer than 16 pixels remain on a side.

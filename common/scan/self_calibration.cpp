@@ -204,19 +204,24 @@ void refuse_other_direction(const ScanImages& images,
                             const std::vector<int>& used,
                             const SelfCalibrationOptions& options,
                             ThreadPool& pool,
-                            double cost) {
+                            double cost,
+                            const std::function<void(const std::string&)>& report) {
   constexpr int kRounds = 3;
   const Rounds other(turned_around(images), used, options, pool);
   ScanCalibration calibration = stated_calibration(other.images(), used, options, pool);
   const double other_cost = other.improve(calibration, kRounds);
-  if (other_cost < cost) {
-    std::ostringstream costs;
-    costs << cost << " against " << other_cost;
+  std::ostringstream costs;
+  costs << cost << " against " << other_cost;
+  // An object that looks alike from all sides tells no direction: noise must not decide.
+  constexpr double kClearly = 0.9;
+  if (other_cost > kClearly * cost && cost > kClearly * other_cost)
+    report("Warning: the images hardly tell which way the scan turns (cost " + costs.str() +
+           "); the sign of step_deg is taken as stated");
+  if (other_cost <= kClearly * cost)
     throw InputError("step_deg",
                      "residual " + costs.str() + " when the scan turns the other way",
                      "the images agree better with the opposite direction: change the sign of "
                      "step_deg, or mirror the images");
-  }
 }
 
 }  // namespace
@@ -241,8 +246,8 @@ void SelfCalibrationOptions::describe(Fields& field) {
   field("focal_share",
         focal_share,
         "The detector's distance is sought within this share of the stated one; 0: kept. "
-        "Projections hardly determine it, and all lengths of the CT scale with it: give 0 if it "
-        "was measured")
+        "Projections hardly determine it, and all lengths of the CT scale with it. Default: the "
+        "scan's distance_tolerance")
       .within(0.0, 0.3);
   field("tilt_deg", tilt_deg, "The detector's tilt is sought within so many degrees; 0: kept")
       .within(0.0, 10.0);
@@ -396,12 +401,13 @@ ScanCalibration self_calibrate(const ScanImages& images,
   ScanCalibration calibration = stated;
   double cost = search.improve(calibration, kFirstRounds);
   report(calibration_line("As stated", calibration, cost));
-  refuse_other_direction(search.images(), used, options, pool, cost);
-  if (options.focal_share > 0.0) {
+  refuse_other_direction(search.images(), used, options, pool, cost, report);
+  const double focal_share = options.focal_share.value_or(images.scan.distance_tolerance);
+  if (focal_share > 0.0) {
     seek(search,
          calibration,
          &ScanCalibration::source_to_detector_mm,
-         options.focal_share * images.scan.source_to_detector_mm);
+         focal_share * images.scan.source_to_detector_mm);
     cost = search.improve(calibration, 2);
     report(calibration_line("Distance sought", calibration, cost));
   }

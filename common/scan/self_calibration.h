@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,10 +19,11 @@ struct SelfCalibrationOptions {
   int rounds = 6;        ///< at the finer of two resolutions
   double fine_px = 1.0;  ///< of the band pass, pixels of the working resolution
   double coarse_px = 6.0;
-  int working_px = 200;       ///< the larger side of the images that rounds work on, at most
-  int search_px = 120;        ///< likewise for the search of what projections hardly tell
-  double focal_share = 0.15;  ///< source to detector is sought within this share of the stated one
-  double tilt_deg = 1.0;      ///< and the tilt within this
+  int working_px = 200;  ///< the larger side of the images that rounds work on, at most
+  int search_px = 120;   ///< likewise for the search of what projections hardly tell
+  /// Source to detector is sought within this share of the stated one; none: the scan's tolerance.
+  std::optional<double> focal_share;
+  double tilt_deg = 1.0;  ///< and the tilt within this
 
   void describe(Fields& field);
 };

@@ -76,6 +76,54 @@ Residuals robust_residuals(const std::vector<std::size_t>& pixels,
   return residuals;
 }
 
+/// Mean squares over the 9 x 9 pixels around each.
+std::vector<double> squares_around(const Image2d& image) {
+  constexpr int kRadius = 4;
+  const auto width = static_cast<std::size_t>(image.width);
+  const auto height = static_cast<std::size_t>(image.height);
+  // sums[row][column]: of all pixels above and left.
+  std::vector<double> sums((width + 1) * (height + 1), 0.0);
+  const auto sum = [&](std::size_t column, std::size_t row) -> double& {
+    return sums[row * (width + 1) + column];
+  };
+  for (std::size_t row = 0; row < height; ++row)
+    for (std::size_t column = 0; column < width; ++column) {
+      const auto value = static_cast<double>(image.pixels[row * width + column]);
+      sum(column + 1, row + 1) =
+          value * value + sum(column, row + 1) + sum(column + 1, row) - sum(column, row);
+    }
+  std::vector<double> means(image.pixels.size());
+  for (int row = 0; row < image.height; ++row)
+    for (int column = 0; column < image.width; ++column) {
+      const auto left = static_cast<std::size_t>(std::max(0, column - kRadius));
+      const auto right = static_cast<std::size_t>(std::min(image.width, column + kRadius + 1));
+      const auto above = static_cast<std::size_t>(std::max(0, row - kRadius));
+      const auto below = static_cast<std::size_t>(std::min(image.height, row + kRadius + 1));
+      const double inside =
+          sum(right, below) - sum(left, below) - sum(right, above) + sum(left, above);
+      means[static_cast<std::size_t>(row) * width + static_cast<std::size_t>(column)] =
+          std::max(0.0, inside) / static_cast<double>((right - left) * (below - above));
+    }
+  return means;
+}
+
+/// ViewAlignment::residual. Edges of what stands still are predicted to some tenths of themselves;
+/// what moved leaves all of its detail where it is, or where it was.
+std::vector<float> residual_over_expected(const std::vector<std::size_t>& pixels,
+                                          const Image2d& predicted,
+                                          const Residuals& residuals) {
+  constexpr double kDetailShare = 0.1;
+  const std::vector<double> detail = squares_around(predicted);
+  std::vector<float> over(predicted.pixels.size(), 0.0F);
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    const double share = kDetailShare * residuals.gain;
+    const double expected =
+        std::sqrt(residuals.scale * residuals.scale + share * share * detail[pixels[i]]);
+    over[pixels[i]] = static_cast<float>(residuals.value[i] / expected);
+  }
+  return over;
+}
+
 /// Mean of the robust residuals against what they would be for a prediction of nothing.
 double relative_cost(const std::vector<std::size_t>& pixels,
                      const Image2d& measured,
@@ -139,9 +187,7 @@ ViewAlignment align_view(const Image2d& measured,
   alignment.response = slopes_product.cwiseQuotient(slopes_square);
   alignment.cost = relative_cost(pixels, measured, residuals);
   alignment.gain = residuals.gain;
-  alignment.residual.assign(is_counted.size(), 0.0F);
-  for (std::size_t i = 0; i < pixels.size(); ++i)
-    alignment.residual[pixels[i]] = static_cast<float>(residuals.value[i] / residuals.scale);
+  alignment.residual = residual_over_expected(pixels, predicted, residuals);
   return alignment;
 }
 

@@ -27,7 +27,9 @@ struct ViewAlignment {
   Eigen::Vector2d response = Eigen::Vector2d::Ones();
   double cost = 0.0;  ///< mean of the robust residual, in units of the measured image's variance
   double gain = 1.0;
-  std::vector<float> residual;  ///< measured - gain * predicted, in its robust standard deviations
+  /// measured - gain * predicted over what is expected there: its robust standard deviation, and a
+  /// share of the predicted detail around, which no reconstruction predicts exactly.
+  std::vector<float> residual;
 };
 
 /// Both images are band passed; `weight` says which pixels count (not 0). `beam_foot_px` is what

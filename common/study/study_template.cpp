@@ -87,6 +87,41 @@ xray_domain = "intensity"
 roi_px = [156, 156, 200, 200]
 )";
 
+constexpr const char* kScanText =
+    R"(# A circular cone-beam scan, for af-scan and jobs/real-xrays.sh. Lengths in mm, angles in degrees.
+#
+# Frame: the object. +z is the rotation axis; the camera of angle 0 has its source at (0, -source_to_axis_mm, 0) and
+# looks along +y; that of angle a is this one turned by a about +z. If the object turns and the camera stands still,
+# the camera turns the other way: change the sign. Pixels are (column, row), the first is 0, integers are pixel centres.
+# Keys behind a '#' are optional.
+name = "my-scan"                                 # letters, digits, - and _
+source_to_axis_mm = 308.7                        # SOD, SAD, SID
+axis_to_detector_mm = 149.0                      # SDD - SOD: from the axis on to the detector, not from the source
+# distance_tolerance = 0.1                       # the detector may stand so far off, as a share; without it it was measured
+pixel_spacing_mm = [0.37, 0.37]                  # of columns and rows, on the detector
+size_px = [350, 350]                             # columns, rows
+rotation_axis = "rows"                           # +z is up in the images (along decreasing rows); or "columns": to the right
+# beam_foot_px = [174.5, 174.5]                  # where the perpendicular from the source meets the detector; its middle
+
+# The angles: evenly spaced, all the way round; or, instead of all three keys, angles_deg = [0.0, 1.0, ...], or
+# a file of them beside this one, a number per view: angles_file = "angles.txt".
+view_count = 360
+step_deg = 1.0                                   # below 0: the other way round
+# first_angle_deg = 0.0
+
+# The images: PNG, TIFF, MetaImage, NRRD, NIfTI or DICOM, all in one folder. {} is the index of the file, {:04} with four
+# digits. A name without braces is one file of all views. Or files_file = "files.txt" beside this file, a name per view.
+files = "Projection{}.png"
+# first_index = 0
+# index_step = 1                                 # 3: every third file is a view
+xray_domain = "intensity"                        # bright = unattenuated; or "attenuation": line integrals -ln(I / I0),
+                                                 # with attenuation_scale = 1e-4 where they are stored times 10000
+# What the detector counts without beam, and without the object; or images of them in the same folder, dark = "dark.png"
+# and flat = "flat.png". Without flat or flat_level air must be seen on both sides of the object.
+# dark_level = 100.0
+# flat_level = 40000.0
+)";
+
 constexpr const char* kRigHead =
     R"(# X-ray cameras, in room coordinates (mm). column x row must point along the beam, from source to detector; `af-inspect
 # rig.toml` says so, and what else is wrong, with the line. Instead of the four geometry keys a camera may have
@@ -97,13 +132,14 @@ constexpr const char* kRigHead =
 }  // namespace
 
 std::vector<std::string> template_names() {
-  return {"study", "rig"};
+  return {"study", "rig", "scan"};
 }
 
 std::string template_text(const std::string& name) {
   if (name == "study") return kStudyText;
   if (name == "rig") return kRigHead + builtin_rig_text("c-arm-12in");
-  throw InputError("template", name, "must be study or rig");
+  if (name == "scan") return kScanText;
+  throw InputError("template", name, "must be study, rig or scan");
 }
 
 }  // namespace af

@@ -6,7 +6,7 @@
 
 namespace af {
 
-/// What template_text() knows: study, rig.
+/// What template_text() knows: study, rig, scan.
 std::vector<std::string> template_names();
 
 /// A file to fill in, every key with a comment: valid as it is, and with its optional keys

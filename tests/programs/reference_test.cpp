@@ -58,7 +58,9 @@ std::string file_page() {
       << "## study.toml\n\n`af-inspect --template study` prints this:\n\n```toml\n"
       << template_text("study") << "```\n\n## rig.toml\n\n`af-inspect --template rig` prints "
       << "this:\n\n```toml\n"
-      << template_text("rig") << "```\n\n## Fields (`.af.h5`)\n\nHDF5, format "
+      << template_text("rig") << "```\n\n## scan.toml\n\n`af-inspect --template scan` prints "
+      << "this ([how it is used](../real-xrays.md)):\n\n```toml\n"
+      << template_text("scan") << "```\n\n## Fields (`.af.h5`)\n\nHDF5, format "
       << field_layout::kFormat << ", version " << field_layout::kFormatVersion
       << ". A field of several depth slabs has `/geometry/slab_1/`, `/field/slab_1` and so on. "
       << "`/field/slab_0` holds the codeword of each tile, uint16, by (u, v, s, t). Fields of "

@@ -188,6 +188,47 @@ TEST_F(AfScan, RefusesMoreFilesThanViews) {
   expect_refused(3, "p120.png exists, too");
 }
 
+TEST_F(AfScan, RefusesAViewThatWasExposedOtherwise) {
+  Image2d dark = read_image(image(30));
+  for (float& value : dark.pixels) value = std::round(500.0F + 0.1F * (value - 500.0F));
+  write_image_u16(dark, image(30), 0.9, 0.9);
+  expect_refused(3, "view 30");
+}
+
+/// Transmissions are what is left of counts over the open beam.
+TEST_F(AfScan, TakesTransmissionsAsWellAsCounts) {
+  std::string text = kScan;
+  text.replace(text.find("dark_level = 500\n"), 17, "flat_level = 1.0\n");
+  text.replace(text.find(".png"), 4, ".mha");
+  const CircularScan scan = test::small_scan();
+  const ScanCalibration truth = true_geometry(scan);
+  for (std::size_t view = 0; view < 120; ++view) {
+    Image2d transmission =
+        test::ball_image(scan_camera(scan, truth, scan.angles_rad[view]), test::lopsided_balls());
+    for (float& value : transmission.pixels) value = std::exp(-value);
+    write_image(transmission, image(view).replace_extension(".mha"), 0.9, 0.9);
+  }
+  write_text_file(scratch_ / "scan.toml", text);
+  const test::ProgramRun done = run();
+  ASSERT_EQ(done.exit_code, 0) << done.output;
+  const Study study = read_study(scratch_ / "study" / "study.toml");
+  const StudyView& view = study.cases[0].views[0];
+  const CameraGeometry& camera = study.rig.camera(view.camera);
+  const Image2d xray = read_view_xray(view, camera).attenuation;
+  const Eigen::Vector2d pixel = camera.project(test::lopsided_balls()[2].center_mm);
+  EXPECT_GT(
+      xray.at(static_cast<int>(std::lround(pixel.x())), static_cast<int>(std::lround(pixel.y()))),
+      0.3F);
+}
+
+TEST_F(AfScan, RefusesAttenuationThatIsNoLineIntegral) {
+  std::string text = kScan;
+  text.replace(text.find("dark_level = 500\n"), 17, "");
+  text.replace(text.find("\"intensity\""), 11, "\"attenuation\"");
+  write_text_file(scratch_ / "scan.toml", text);
+  expect_refused(3, "state attenuation_scale");
+}
+
 TEST_F(AfScan, RefusesAnImageOfAnotherSize) {
   write_image_u16(Image2d(72, 61), image(30), 0.9, 0.9);
   expect_refused(3, "must be size_px of the scan: 72 x 60");
@@ -227,7 +268,8 @@ class CbctCylinder : public testing::Test {
 TEST_F(CbctCylinder, AnExcerptGivesTheNumbersThatWereMeasured) {
   const tools::ScanFile file = tools::read_scan_file(AF_CBCT_CYLINDER_TOML);
   ThreadPool pool(2);
-  const ScanImages all = tools::read_scan_images(file, folder_, 350, pool).binned(3);
+  const ScanImages all =
+      tools::read_scan_images(file, folder_, 350, pool, [](const auto&) {}).binned(3);
   // Every third view: 120, 3 degrees apart.
   ScanImages images = all;
   images.scan.angles_rad.clear();

@@ -123,7 +123,7 @@ void InspectOptions::describe(Fields& field) {
   field("template",
         template_name,
         "Print a file to fill in, every key with a comment: study (af-inspect --template study > "
-        "study.toml) or rig")
+        "study.toml), rig, or scan: a cone-beam scan for af-scan")
       .choice(template_names())
       .one_of_group("What");
   field("json", as_json, "Print one JSON array instead of text");

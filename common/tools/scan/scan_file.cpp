@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "base/file_name.h"
+#include "base/number_text.h"
 #include "base/parsed_number.h"
 #include "files/output_file.h"
 #include "geometry/rigid_transform.h"
@@ -37,15 +38,19 @@ std::optional<IndexPlace> index_place(const std::string& pattern) {
   return IndexPlace{open, close - open + 1, static_cast<std::size_t>(inside[2] - '0')};
 }
 
-std::optional<double> get_number(TomlTableReader& reader, const char* key, Presence presence) {
+/// Finite and of a magnitude of at most `most`.
+std::optional<double> get_number(TomlTableReader& reader,
+                                 const char* key,
+                                 Presence presence,
+                                 double most = kMaxRoomMm) {
   if (!reader.has(key)) {
     if (presence == Presence::Required) (void)reader.get_string(key, presence);  // notes it
     return std::nullopt;
   }
   const toml::node& node = reader.node(key);
   const auto value = node.is_number() ? node.value<double>() : std::nullopt;
-  if (!value || !std::isfinite(*value) || std::abs(*value) > kMaxRoomMm) {
-    reader.add_problem(key, "must be a number, finite and within 1e6");
+  if (!value || !std::isfinite(*value) || std::abs(*value) > most) {
+    reader.add_problem(key, "must be a number, finite and within " + number_text(most));
     return std::nullopt;
   }
   return value;
@@ -83,22 +88,38 @@ void read_geometry(TomlTableReader& reader, CircularScan& scan) {
   scan.size_px = size ? Eigen::Vector2i((*size)[0], (*size)[1]) : Eigen::Vector2i(16, 16);
   scan.axis_along = axis == "columns" ? AxisAlong::Columns : AxisAlong::Rows;
   scan.beam_foot_px = reader.get_vector<2>("beam_foot_px", Presence::Optional);
+  constexpr double kMostTolerance = 0.3;
+  const auto tolerance = get_number(reader, "distance_tolerance", Presence::Optional);
+  scan.distance_tolerance = tolerance.value_or(0.0);
+  if (!(scan.distance_tolerance >= 0.0 && scan.distance_tolerance <= kMostTolerance))
+    reader.add_problem("distance_tolerance",
+                       "must be between 0 (the distances were measured) and 0.3");
 }
 
-/// Numbers between blanks or line ends, as many as there are; # begins a comment.
-std::vector<double> read_angles_file(const std::filesystem::path& path) {
+/// The words between blanks or line ends, each with its place; # begins a comment.
+struct PlacedWord {
+  std::string word;
+  std::string place;  ///< file:line
+};
+std::vector<PlacedWord> words_of_file(const std::filesystem::path& path) {
   std::istringstream lines(read_text_file(path, kMostTomlBytes));
-  std::vector<double> angles_deg;
+  std::vector<PlacedWord> found;
   std::string line;
   for (int number = 1; std::getline(lines, line); ++number) {
     std::istringstream words(line.substr(0, line.find('#')));
-    for (std::string word; words >> word;) {
-      const std::optional<double> angle_deg = finite_number(word);
-      if (!angle_deg)
-        throw FileError(path.string() + ":" + std::to_string(number),
-                        "'" + word + "' is not an angle: angles_file holds a number per view");
-      angles_deg.push_back(*angle_deg);
-    }
+    for (std::string word; words >> word;)
+      found.push_back({word, path.string() + ":" + std::to_string(number)});
+  }
+  return found;
+}
+
+std::vector<double> read_angles_file(const std::filesystem::path& path) {
+  std::vector<double> angles_deg;
+  for (const auto& [word, place] : words_of_file(path)) {
+    const std::optional<double> angle_deg = finite_number(word);
+    if (!angle_deg)
+      throw FileError(place, "'" + word + "' is not an angle: angles_file holds a number per view");
+    angles_deg.push_back(*angle_deg);
   }
   return angles_deg;
 }
@@ -133,7 +154,25 @@ void read_angles(TomlTableReader& reader, const std::filesystem::path& folder, C
                               kRadPerDeg);
 }
 
-void read_image_keys(TomlTableReader& reader, ScanFile& file) {
+/// The names of files_file, one per view.
+void read_listed_files(TomlTableReader& reader,
+                       const std::filesystem::path& folder,
+                       ScanFile& file) {
+  for (const char* const key : {"files", "first_index", "index_step"})
+    if (reader.has(key)) reader.add_problem(key, "must not be given together with files_file");
+  const auto list = reader.get_string("files_file", Presence::Required);
+  if (!list) return;
+  for (const PlacedWord& name : words_of_file(folder / *list))
+    file.listed_files.push_back(name.word);
+  if (file.listed_files.size() != file.scan.angles_rad.size())
+    reader.add_problem(
+        "files_file",
+        "must hold a file name per view: " + std::to_string(file.listed_files.size()) + " for " +
+            std::to_string(file.scan.angles_rad.size()) + " views");
+}
+
+/// Names by a pattern, or of a stack.
+void read_file_pattern(TomlTableReader& reader, ScanFile& file) {
   file.files = reader.get_string("files", Presence::Required).value_or("{}");
   const bool has_braces = file.files.find_first_of("{}") != std::string::npos;
   if (has_braces && !index_place(file.files))
@@ -141,20 +180,35 @@ void read_image_keys(TomlTableReader& reader, ScanFile& file) {
         "files",
         "must contain {} once in place of the view's index ({:04} for four digits), or, for a "
         "stack of all views, no braces at all");
-  if (file.is_stack() && reader.has("first_index"))
-    reader.add_problem("first_index",
-                       "is for files with an index; a stack's first image is the "
-                       "first view");
+  for (const char* const key : {"first_index", "index_step"})
+    if (file.is_stack() && reader.has(key))
+      reader.add_problem(key,
+                         "is for files with an index; a stack's images are the views in their "
+                         "order");
   file.first_index = get_index(reader, "first_index", 0, Presence::Optional).value_or(0);
+  file.index_step = get_index(reader, "index_step", 1, Presence::Optional).value_or(1);
+}
+
+void read_image_keys(TomlTableReader& reader, const std::filesystem::path& folder, ScanFile& file) {
+  if (reader.has("files_file"))
+    read_listed_files(reader, folder, file);
+  else
+    read_file_pattern(reader, file);
   const auto domain = reader.get_string("xray_domain", Presence::Required);
   if (domain && *domain != "intensity" && *domain != "attenuation")
     reader.add_problem("xray_domain", "must be \"intensity\" or \"attenuation\"");
   file.xray_domain = domain == "attenuation" ? XrayDomain::Attenuation : XrayDomain::Intensity;
-  const auto dark_level = get_number(reader, "dark_level", Presence::Optional);
+  file.attenuation_scale =
+      get_number(reader, "attenuation_scale", Presence::Optional).value_or(1.0);
+  if (reader.has("attenuation_scale") && file.xray_domain == XrayDomain::Intensity)
+    reader.add_problem("attenuation_scale", "is for xray_domain = \"attenuation\" alone");
+  if (!(file.attenuation_scale > 0.0)) reader.add_problem("attenuation_scale", "must be above 0");
+  constexpr double kMostCounts = 1e12;
+  const auto dark_level = get_number(reader, "dark_level", Presence::Optional, kMostCounts);
   file.dark_level = dark_level.value_or(0.0);
   file.dark = reader.get_string("dark", Presence::Optional);
   file.flat = reader.get_string("flat", Presence::Optional);
-  file.flat_level = get_number(reader, "flat_level", Presence::Optional);
+  file.flat_level = get_number(reader, "flat_level", Presence::Optional, kMostCounts);
   if (file.flat_level && !(*file.flat_level > file.dark_level))
     reader.add_problem("flat_level", "must be above dark_level: what the open beam counts");
   if (file.flat_level && file.flat)
@@ -169,13 +223,14 @@ void read_image_keys(TomlTableReader& reader, ScanFile& file) {
 }  // namespace
 
 bool ScanFile::is_stack() const {
-  return !index_place(files);
+  return listed_files.empty() && !index_place(files);
 }
 
 std::string ScanFile::file_of(int view) const {
+  if (!listed_files.empty()) return listed_files.at(static_cast<std::size_t>(view));
   if (is_stack()) return files;
   const IndexPlace place = index_place(files).value();
-  std::string index = std::to_string(first_index + view);
+  std::string index = std::to_string(first_index + view * index_step);
   if (index.size() < place.digits) index.insert(0, place.digits - index.size(), '0');
   std::string path = files;
   return path.replace(place.begin, place.length, index);
@@ -189,8 +244,9 @@ ScanFile parse_scan_file(const std::string& text, const std::string& file) {
   result.name = reader.get_string("name", Presence::Optional).value_or("scan");
   if (!is_plain_file_name(result.name)) reader.add_problem("name", "must be usable in a file name");
   read_geometry(reader, result.scan);
-  read_angles(reader, std::filesystem::path(file).parent_path(), result.scan);
-  read_image_keys(reader, result);
+  const std::filesystem::path folder = std::filesystem::path(file).parent_path();
+  read_angles(reader, folder, result.scan);
+  read_image_keys(reader, folder, result);
   reader.refuse_unknown_keys();
   problems.throw_if_any();
   throw_if_any(af::problems(result.scan), file);

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "scan/scan_geometry.h"
 #include "study/study_file.h"
@@ -17,7 +18,11 @@ struct ScanFile {
   /// "Projection{}.png"; {:04} writes the index with four digits; without braces a stack of views.
   std::string files;
   int first_index = 0;
+  int index_step = 1;  ///< from one view's file to the next one's
+  /// Instead of all three: a file per view.
+  std::vector<std::string> listed_files;
   XrayDomain xray_domain = XrayDomain::Intensity;
+  double attenuation_scale = 1.0;  ///< line integral per stored number
   double dark_level = 0.0;  ///< counts of every pixel without beam, if there is no dark image
   std::optional<std::string> dark;
   std::optional<std::string> flat;

@@ -4,18 +4,17 @@
 #include <algorithm>
 
 #include "base/error.h"
+#include "base/number_text.h"
 #include "image_files/image_file.h"
 #include "scan/image_sampling.h"
 #include "scan/line_integrals.h"
+#include "text/csv_table.h"
 
 namespace af::tools {
 
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Half a count: what a pixel without any stands for under the logarithm.
-constexpr double kLeastCount = 0.5;
 
 Image2d sized(const Image2d& image, const fs::path& path, const CircularScan& scan, int bin) {
   if (image.width != scan.size_px.x() || image.height != scan.size_px.y())
@@ -51,11 +50,13 @@ void refuse_other_count(const ScanFile& file, const fs::path& folder) {
     throw FileError(
         last.string(),
         "no such file, but view_count = " + std::to_string(count) + " wants one for every view");
+  if (!file.listed_files.empty()) return;
   const fs::path next = folder / file.file_of(count);
   if (fs::exists(next))
     throw InputError("view_count",
                      std::to_string(count),
-                     "must count all views, but " + next.string() + " exists, too");
+                     "must count all views, but " + next.string() +
+                         " exists, too (to leave views out, name the others in files_file)");
 }
 
 std::vector<Image2d> read_views(const ScanFile& file, const fs::path& folder, int bin) {
@@ -111,12 +112,94 @@ AirLevel air_level(const ScanFile& file,
   return air_level_of_flat(flat, statistics);
 }
 
+double share_of(const std::vector<unsigned char>& flags) {
+  const auto set = std::count_if(flags.begin(), flags.end(), [](auto flag) { return flag != 0; });
+  return static_cast<double>(set) / static_cast<double>(std::max<std::size_t>(1, flags.size()));
+}
+
+/// What the open beam was taken to be, and whether each view was exposed like the others: one that
+/// was not says nothing of the object.
+void report_beam(const ScanFile& file,
+                 const AirLevel& level,
+                 const std::vector<Image2d>& counts,
+                 const ReportLine& report) {
+  std::vector<double> beams;
+  for (const Image2d& image : counts) beams.push_back(beam_of(image, level));
+  std::vector<double> sorted = beams;
+  std::sort(sorted.begin(), sorted.end());
+  const double middle = sorted[sorted.size() / 2];
+  const double air_share = share_of(level.is_air);
+  const bool has_flat = file.flat || file.flat_level;
+  if (air_share == 0.0) {
+    report("Open beam: no pixel sees past the object in all views; the flat's exposure is taken");
+    return;
+  }
+  report("Open beam: " +
+         (has_flat ? fixed_text(middle, 3) + " times the flat (median of the views), by "
+                   : std::string("fitted to ")) +
+         fixed_text(100.0 * air_share, 1) + " % of the pixels, which see air in all views");
+  constexpr double kSameExposure = 0.1;
+  if (has_flat && std::abs(middle - 1.0) > kSameExposure)
+    report("Warning: the flat is of another exposure than the views");
+  constexpr double kLeastShare = 0.2;
+  for (std::size_t view = 0; view < beams.size(); ++view)
+    if (beams[view] < kLeastShare * middle || beams[view] * kLeastShare > middle)
+      throw InputError("view " + std::to_string(view),
+                       fixed_text(beams[view] / middle, 3) + " times the others' open beam",
+                       "must be exposed like the others; to leave views out, name the others in "
+                       "files_file and their angles in angles_file",
+                       file.file_of(static_cast<int>(view)));
+}
+
+void report_starved(const AirLevel& level,
+                    const std::vector<Image2d>& counts,
+                    double least_count,
+                    const ReportLine& report) {
+  std::size_t starved = 0;
+  std::size_t lit = 0;
+  for (const Image2d& image : counts)
+    for (std::size_t i = 0; i < level.is_lit.size(); ++i) {
+      if (level.is_lit[i] == 0) continue;
+      ++lit;
+      if (static_cast<double>(image.pixels[i]) < least_count) ++starved;
+    }
+  const double share = static_cast<double>(starved) / static_cast<double>(lit);
+  constexpr double kMany = 1e-3;
+  if (share > kMany)
+    report("Warning: " + fixed_text(100.0 * share, 2) +
+           " % of the pixels count nothing above the dark level: dark_level is too high, or the "
+           "object lets nothing through");
+}
+
+/// Stored numbers become line integrals.
+void scale_attenuation(const ScanFile& file, std::vector<Image2d>& images) {
+  // No detector counts exp(-30) of a beam; a few pixels may be broken.
+  constexpr float kLargest = 30.0F;
+  constexpr double kFew = 1e-3;
+  float largest = 0.0F;
+  std::size_t beyond = 0;
+  std::size_t all = 0;
+  for (Image2d& image : images)
+    for (float& value : image.pixels) {
+      value *= static_cast<float>(file.attenuation_scale);
+      largest = std::max(largest, value);
+      if (value > kLargest) ++beyond;
+      ++all;
+    }
+  if (static_cast<double>(beyond) > kFew * static_cast<double>(all))
+    throw InputError("xray_domain",
+                     "\"attenuation\" with numbers up to " + number_text(largest),
+                     "must hold line integrals -ln(I / I0), at most 30; where they are stored "
+                     "multiplied, state attenuation_scale, e.g. 1e-4");
+}
+
 }  // namespace
 
 ScanImages read_scan_images(const ScanFile& file,
                             const fs::path& folder,
                             int most_px,
-                            ThreadPool& pool) {
+                            ThreadPool& pool,
+                            const ReportLine& report) {
   const int bin = std::max(1, (file.scan.size_px.maxCoeff() + most_px - 1) / most_px);
   ScanImages images;
   images.scan = file.scan.binned(bin);
@@ -124,15 +207,19 @@ ScanImages read_scan_images(const ScanFile& file,
   const auto count = static_cast<int>(images.line_integrals.size());
   if (file.xray_domain == XrayDomain::Attenuation) {
     images.is_lit.assign(images.line_integrals.front().pixels.size(), 1);
+    scale_attenuation(file, images.line_integrals);
     return images;
   }
   const DarkLevel dark(file, folder, bin);
   for (Image2d& image : images.line_integrals) dark.subtract_from(image);
   const AirLevel level = air_level(file, folder, images.line_integrals, dark, bin);
   images.is_lit = level.is_lit;
+  const double least_count = least_count_of(level);
+  report_beam(file, level, images.line_integrals, report);
+  report_starved(level, images.line_integrals, least_count, report);
   pool.for_each(count, [&](int view, int /*slot*/) {
     Image2d& image = images.line_integrals[static_cast<std::size_t>(view)];
-    image = line_integrals_of(image, level, file.scan.axis_along, kLeastCount);
+    image = line_integrals_of(image, level, file.scan.axis_along, least_count);
   });
   return images;
 }

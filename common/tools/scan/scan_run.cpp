@@ -22,7 +22,7 @@ CalibratedScan calibrated_scan(const ScanOptions& options,
                                int enlarged,
                                ScanImages images,
                                ThreadPool& pool,
-                               const Communicator& world) {
+                               const ReportLine& report) {
   const int count = static_cast<int>(images.scan.angles_rad.size());
   const std::vector<int> even = CircularScan::every(0, 2, count);
   const std::vector<int> odd = CircularScan::every(1, 2, count);
@@ -30,24 +30,23 @@ CalibratedScan calibrated_scan(const ScanOptions& options,
   CalibratedScan scan;
   scan.name = name;
   scan.enlarged = enlarged;
-  const auto report = [&](const std::string& line) { inform(world, line); };
   scan.calibration = options.is_as_stated ? ScanCalibration::nominal(images.scan, 0)
                                           : self_calibrate(images, even, how, pool, report);
-  inform(world, "Judging by the odd views");
+  report("Judging by the odd views");
   scan.calibrated = held_out_residual(images, scan.calibration, even, odd, how, pool);
   scan.as_stated =
       options.is_as_stated
           ? scan.calibrated
           : held_out_residual(
                 images, stated_calibration(images, even, how, pool), even, odd, how, pool);
-  inform(world, "Reconstructing the even views");
+  report("Reconstructing the even views");
   FdkOptions fdk = options.fdk;
   constexpr double kVoxelPx = 1.5;
   if (fdk.voxel_mm == 0.0)
     fdk.voxel_mm = kVoxelPx * images.scan.pixel_spacing_mm.minCoeff() *
                    images.scan.source_to_axis_mm / scan.calibration.source_to_detector_mm;
   const MuVolume volume = reconstruct_views(images, scan.calibration, even, fdk, pool);
-  scan.water_mu_per_mm = reference_mu_per_mm(volume);
+  scan.water_mu_per_mm = registration_water_mu_per_mm(volume);
   scan.object_radius_mm = object_radius_mm(volume);
   scan.ct = ct_of(volume, scan.water_mu_per_mm);
   scan.images = std::move(images);
@@ -71,11 +70,11 @@ void run_scan(const ScanOptions& options,
   const std::filesystem::path images_folder =
       options.folder.empty() ? std::filesystem::absolute(options.scan).parent_path()
                              : options.folder;
-  inform(world,
-         "Reading " + std::to_string(file.scan.angles_rad.size()) + " views of " + file.name);
-  ScanImages images = read_scan_images(file, images_folder, options.most_px, pool);
+  const auto report = [&](const std::string& line) { inform(world, line); };
+  report("Reading " + std::to_string(file.scan.angles_rad.size()) + " views of " + file.name);
+  ScanImages images = read_scan_images(file, images_folder, options.most_px, pool, report);
   const CalibratedScan scan =
-      calibrated_scan(options, file.name, enlarged, std::move(images), pool, world);
+      calibrated_scan(options, file.name, enlarged, std::move(images), pool, report);
   const Provenance provenance = {"af-scan",
                                  command_line,
                                  to_toml(options),

@@ -163,11 +163,21 @@ void write_view_picture(const CalibratedScan& scan,
                 path);
 }
 
-void write_view(const ScanOptions& options,
-                const CalibratedScan& scan,
-                int view,
-                const RegionOfInterest& region,
-                const fs::path& folder) {
+/// The share of a region that a mask leaves out.
+double masked_share(const Image2d& mask, const RegionOfInterest& region) {
+  int masked = 0;
+  for (int row = region.row; row < region.row + region.height; ++row)
+    for (int column = region.column; column < region.column + region.width; ++column)
+      if (mask.at(column, row) == 0.0F) ++masked;
+  return static_cast<double>(masked) / static_cast<double>(region.pixel_count());
+}
+
+/// Returns the share of the region that is masked.
+double write_view(const ScanOptions& options,
+                  const CalibratedScan& scan,
+                  int view,
+                  const RegionOfInterest& region,
+                  const fs::path& folder) {
   const CircularScan& geometry = scan.images.scan;
   const Eigen::Vector2d spacing = geometry.pixel_spacing_mm;
   const std::string name = view_name(view);
@@ -179,6 +189,39 @@ void write_view(const ScanOptions& options,
       geometry, scan.images.is_lit, judged(scan, view).alignment.residual, options.mask_deviations);
   write_png_image(mask, folder / (name + "-mask.png"), 0.0, 1.0);
   write_view_picture(scan, view, mask, region, folder / (name + ".png"));
+  return masked_share(mask, region);
+}
+
+/// The response of held-out views that half of them exceed, along columns or rows.
+double median_response(const CalibratedScan& scan, int axis) {
+  std::vector<double> responses;
+  for (const JudgedView& row : scan.calibrated.views)
+    responses.push_back(row.alignment.response[axis]);
+  const auto middle = responses.begin() + static_cast<std::ptrdiff_t>(responses.size() / 2);
+  std::nth_element(responses.begin(), middle, responses.end());
+  return *middle;
+}
+
+/// What people should know before they trust the study, a line each.
+std::string warnings_of(const CalibratedScan& scan, double most_masked) {
+  std::string text;
+  constexpr double kMuchMasked = 0.05;
+  if (most_masked > kMuchMasked)
+    text += "\nWarning: up to " + fixed_text(100.0 * most_masked, 1) +
+            " % of an X-ray is masked as moved: look at the pictures, or give --mask-deviations 0";
+  constexpr double kLeastResponse = 0.3;
+  for (const int axis : {0, 1})
+    if (const double response = median_response(scan, axis); response < kLeastResponse)
+      text += std::string("\nWarning: the views hardly show shifts along ") +
+              (axis == 0 ? "columns" : "rows") + " (response " + fixed_text(response, 2) +
+              "): the gold residual says little there";
+  constexpr double kMuchUnexplained = 0.25;
+  if (scan.calibrated.cost > kMuchUnexplained)
+    text += "\nWarning: held-out views share little detail with their predictions (cost " +
+            fixed_text(scan.calibrated.cost, 2) +
+            "): the object reaches far beyond the detector or moves, or the stated geometry is "
+            "wrong (step_deg, rotation_axis, the files' order)";
+  return text;
 }
 
 std::string series_text(const char* key, const AngleSeries& series) {
@@ -201,7 +244,11 @@ std::string calibration_text(const CalibratedScan& scan) {
   text += series_text("beam_foot_column_px", found.column_px);
   text += series_text("beam_foot_row_px", found.row_px);
   text += series_text("detector_rotation_rad", found.rotation_rad);
+  text += "stated_source_to_detector_mm = " + toml_number(scan.images.scan.source_to_detector_mm) +
+          "\n";
   text += "water_mu_per_mm = " + toml_number(scan.water_mu_per_mm) + "\n";
+  text +=
+      "held_out_cost = " + toml_number(after.cost) + "  # of the odd views' detail, unexplained\n";
   text += "gold_residual_px = " + toml_number(after.rms_px) + "\n";
   text += "gold_residual_mm_at_axis = " + toml_number(after.rms_mm_at_axis) + "\n";
   text += "stated_residual_px = " + toml_number(scan.as_stated.rms_px) + "\n";
@@ -334,6 +381,7 @@ std::string write_scan_study(const ScanOptions& options,
   study.path = folder / "study.toml";
   study.rig_name_or_path = (folder / "rig.toml").string();
   std::vector<int> written;
+  double most_masked = 0.0;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     const RigidTransform nominal = nominal_pose(options, scan.name, static_cast<int>(i));
     study.cases.push_back(case_of(
@@ -344,7 +392,7 @@ std::string write_scan_study(const ScanOptions& options,
       if (std::find(written.begin(), written.end(), view) != written.end()) continue;
       written.push_back(view);
       study.rig.cameras.push_back(camera_of(scan, view));
-      write_view(options, scan, view, region, folder);
+      most_masked = std::max(most_masked, write_view(options, scan, view, region, folder));
     }
   }
   if (options.writes_projections) write_projections(scan, region, folder);
@@ -362,7 +410,12 @@ std::string write_scan_study(const ScanOptions& options,
          fixed_text(scan.as_stated.rms_mm_at_axis, 4) + " mm)" +
          (scan.enlarged == 1 ? ""
                              : "\nAll lengths are " + std::to_string(scan.enlarged) +
-                                   " times those of the scan's file, these, too");
+                                   " times those of the scan's file, these, too") +
+         "\nDetector's distance from the source: " +
+         fixed_text(scan.calibration.source_to_detector_mm, 1) +
+         " mm (stated: " + fixed_text(scan.images.scan.source_to_detector_mm, 1) +
+         " mm); masked: at most " + fixed_text(100.0 * most_masked, 1) + " % of an X-ray" +
+         warnings_of(scan, most_masked);
 }
 
 }  // namespace af::tools

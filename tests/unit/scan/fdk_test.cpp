@@ -121,6 +121,24 @@ TEST(Fdk, DoesNotDependOnThreads) {
             reconstruct_views(images, truth, views, {}, three).mu_per_mm);
 }
 
+TEST(LightShare, KeepsPlasticBesideMetal) {
+  // 1 % of steel and 40 % of plastic within air with noise about 0.
+  MuVolume volume{{{10, 10, 10}}, std::vector<float>(1000, 0.0F)};
+  for (std::size_t i = 0; i < 1000; ++i) {
+    volume.mu_per_mm[i] = i % 2 == 0 ? 0.001F : -0.001F;
+    if (i < 400) volume.mu_per_mm[i] = 0.02F;
+    if (i >= 990) volume.mu_per_mm[i] = 0.8F;
+  }
+  EXPECT_NEAR(reference_mu_per_mm(volume), 0.4, 1e-6);
+  EXPECT_NEAR(light_share(volume, 0.04), 0.5, 0.01);
+  const double water = registration_water_mu_per_mm(volume);
+  EXPECT_LT(0.1 * water, 0.02) << "plastic is no air";
+  EXPECT_GT(33.0 * water, 0.8) << "steel is within the scale";
+  // Without metal nothing changes.
+  for (std::size_t i = 990; i < 1000; ++i) volume.mu_per_mm[i] = 0.02F;
+  EXPECT_EQ(registration_water_mu_per_mm(volume), reference_mu_per_mm(volume));
+}
+
 TEST(CtOf, IsTheHuScaleOfAWater) {
   const MuVolume volume{{{2, 2, 1}}, {0.0F, 0.02F, 0.04F, -0.02F}};
   const CtVolume ct = ct_of(volume, 0.02);

@@ -100,6 +100,41 @@ TEST(LineIntegrals, FromAFlatImageAreExact) {
                   0.003);
 }
 
+TEST(LineIntegrals, FromAFlatOfAnotherExposureAreThoseOfTheObject) {
+  const CircularScan scan = small_scan();
+  // Beside a ball half as wide as the detector there is air.
+  const ScanImages images = simulated_scan(
+      scan, ScanCalibration::nominal(scan, 0), {test::Ball{{6.0, 0.0, 0.0}, 8.0, 0.03}});
+  const Detector detector{true, 0.02};
+  Image2d flat = detector.counts(Image2d(scan.size_px.x(), scan.size_px.y()), 0);
+  for (float& value : flat.pixels) value *= 2.0F;
+  std::vector<Image2d> counts;
+  for (int view = 0; view < 12; ++view)
+    counts.push_back(
+        detector.counts(images.line_integrals[static_cast<std::size_t>(10 * view)], view));
+  std::vector<const Image2d*> all;
+  for (const Image2d& image : counts) all.push_back(&image);
+  const AirLevel level = air_level_of_flat(flat, pixel_statistics(all));
+  EXPECT_NEAR(beam_of(counts[0], level), 0.5, 0.02);
+  const Image2d found = line_integrals_of(counts[5], level, scan.axis_along, 0.5);
+  EXPECT_NEAR(found.at(36, 30), images.line_integrals[50].at(36, 30), 0.04);
+}
+
+TEST(LineIntegrals, OfTransmissionsAreNotCutAtHalfACount) {
+  AirLevel level{
+      Image2d(20, 20), std::vector<unsigned char>(400, 1), std::vector<unsigned char>(400, 0)};
+  std::fill(level.air.pixels.begin(), level.air.pixels.end(), 1.0F);
+  EXPECT_NEAR(least_count_of(level), 1e-5, 1e-9);
+  Image2d transmission(20, 20);
+  std::fill(transmission.pixels.begin(), transmission.pixels.end(), std::exp(-6.0F));
+  EXPECT_NEAR(
+      line_integrals_of(transmission, level, AxisAlong::Rows, least_count_of(level)).at(3, 3),
+      6.0F,
+      1e-4F);
+  std::fill(level.air.pixels.begin(), level.air.pixels.end(), 255.0F);
+  EXPECT_EQ(least_count_of(level), 0.5);
+}
+
 TEST(LineIntegrals, OfAnObjectBeyondTheDetectorAreThoseOfTheFlat) {
   Image2d flat(20, 20);
   std::fill(flat.pixels.begin(), flat.pixels.end(), 1000.0F);

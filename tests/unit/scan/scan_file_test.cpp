@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/scan/scan_file.h"
 
+#include <regex>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "base/error.h"
 #include "files/output_file.h"
+#include "study/study_template.h"
 #include "support/test_paths.h"
 
 namespace af::tools {
@@ -67,6 +70,53 @@ TEST(ScanFile, WritesIndicesWithoutZerosWhenNotAsked) {
   const ScanFile file = parse_scan_file(with("p{:04}.png", "a/Projection{}.png"), "scan.toml");
   EXPECT_EQ(file.file_of(0), "a/Projection7.png");
   EXPECT_EQ(file.file_of(113), "a/Projection120.png");
+}
+
+TEST(ScanFile, TakesEveryFewthFile) {
+  const ScanFile file =
+      parse_scan_file(with("first_index = 7", "first_index = 7\nindex_step = 3"), "scan.toml");
+  EXPECT_EQ(file.file_of(0), "p0007.png");
+  EXPECT_EQ(file.file_of(2), "p0013.png");
+}
+
+TEST(ScanFile, KeepsTheStatedDistanceUnlessToldOtherwise) {
+  EXPECT_EQ(parse_scan_file(kValid, "scan.toml").scan.distance_tolerance, 0.0);
+  const std::string rough = "axis_to_detector_mm = 100\ndistance_tolerance = ";
+  EXPECT_EQ(parse_scan_file(with("axis_to_detector_mm = 100", rough + "0.1"), "scan.toml")
+                .scan.distance_tolerance,
+            0.1);
+  EXPECT_THAT(message_of(with("axis_to_detector_mm = 100", rough + "0.5")),
+              HasSubstr("must be between 0 (the distances were measured) and 0.3"));
+}
+
+TEST(ScanFile, TheTemplateIsAValidScanWithAndWithoutItsOptionalKeys) {
+  const std::string text = template_text("scan");
+  const ScanFile plain = parse_scan_file(text, "scan.toml");
+  EXPECT_EQ(plain.scan.angles_rad.size(), 360U);
+  EXPECT_EQ(plain.file_of(12), "Projection12.png");
+  const ScanFile full = parse_scan_file(
+      std::regex_replace(text, std::regex("(^|\n)# ([a-z_]+ = )"), "$1$2"), "scan.toml");
+  EXPECT_EQ(full.flat_level, 40000.0);
+  EXPECT_EQ(full.scan.distance_tolerance, 0.1);
+  EXPECT_TRUE(full.scan.beam_foot_px.has_value());
+}
+
+TEST(ScanFile, TakesAListOfFiles) {
+  const test::ScratchFolder scratch;
+  const std::string scan = (scratch / "scan.toml").string();
+  const std::string pattern = "files = \"p{:04}.png\"\nfirst_index = 7\n";
+  const std::string listed = with(pattern, "files_file = \"files.txt\"\n");
+  std::string names;
+  for (int view = 0; view < 120; ++view) names += "a" + std::to_string(3 * view) + ".tif\n";
+  write_text_file(scratch / "files.txt", "# every third\n" + names);
+  const ScanFile file = parse_scan_file(listed, scan);
+  EXPECT_FALSE(file.is_stack());
+  EXPECT_EQ(file.file_of(2), "a6.tif");
+  EXPECT_EQ(file.file_of(119), "a357.tif");
+  write_text_file(scratch / "files.txt", "a.tif b.tif");
+  EXPECT_THROW(parse_scan_file(listed, scan), InputError);
+  EXPECT_THROW(parse_scan_file(with("first_index = 7", "files_file = \"files.txt\""), scan),
+               InputError);
 }
 
 /// The valid text with its evenly spaced angles replaced by a line.

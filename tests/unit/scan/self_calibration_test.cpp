@@ -78,6 +78,27 @@ TEST(SelfCalibration, RefusesAScanThatTurnsTheOtherWay) {
   }
 }
 
+/// A rod about the axis looks alike from either side: noise must not decide.
+TEST(SelfCalibration, TakesTheStatedDirectionWhereImagesTellNone) {
+  const ScanCalibration truth = ScanCalibration::nominal(small_scan(), 0);
+  std::vector<test::Ball> rod;
+  for (int i = -3; i <= 3; ++i) rod.push_back({{0.0, 0.0, 4.0 * i}, 6.0, 0.02});
+  const ScanImages images = simulated_scan(small_scan(), truth, rod);
+  ThreadPool pool(2);
+  SelfCalibrationOptions options = quick_options();
+  options.harmonics = 0;
+  for (const double step_deg : {3.0, -3.0}) {
+    ScanImages turning = images;
+    turning.scan = small_scan(AxisAlong::Rows, step_deg);
+    std::string lines;
+    self_calibrate(
+        turning, CircularScan::every(0, 2, 120), options, pool, [&](const std::string& line) {
+          lines += line + "\n";
+        });
+    EXPECT_THAT(lines, testing::HasSubstr("hardly tell which way the scan turns")) << step_deg;
+  }
+}
+
 TEST(SelfCalibration, RefusesAScanOfNothing) {
   const CircularScan scan = small_scan();
   const ScanImages images = simulated_scan(scan, ScanCalibration::nominal(scan, 0), {});
@@ -114,6 +135,43 @@ TEST(ViewAlignment, FindsAKnownMotion) {
   EXPECT_NEAR(step[1], -0.1, 0.02);
   EXPECT_NEAR(step[2], 0.01, 0.001);
   EXPECT_NEAR(alignment.gain, 1.3, 0.05);
+}
+
+/// What a reconstruction blurs stays; what is gone leaves more than its edges.
+TEST(ViewAlignment, ResidualsTellWhatMovedFromWhatIsPredictedRoughly) {
+  const CircularScan scan = small_scan();
+  const ScanCalibration here = ScanCalibration::nominal(scan, 0);
+  const std::vector<unsigned char> all(static_cast<std::size_t>(scan.size_px.prod()), 1);
+  const BandPass band_pass(scan.size_px.x(), scan.size_px.y(), all, 1.0, 4.0);
+  const CameraGeometry camera = scan_camera(scan, here, 0.3);
+  const test::Ball bone{{-9.0, 0.0, 0.0}, 6.0, 0.05};
+  const test::Ball moving{{9.0, 0.0, 5.0}, 2.0, 0.05};
+  // The bone's prediction is 7 % too weak; air and noise are those of a long exposure.
+  test::Ball predicted_bone = bone;
+  predicted_bone.mu_per_mm *= 0.93;
+  Image2d measured = ball_image(camera, {bone, moving});
+  for (std::size_t i = 0; i < measured.pixels.size(); ++i)
+    measured.pixels[i] += 1e-4F * static_cast<float>(std::sin(1e4 * static_cast<double>(i * i)));
+  const ViewAlignment alignment = align_view(band_pass(measured),
+                                             band_pass(ball_image(camera, {predicted_bone})),
+                                             all,
+                                             {here.column_px.at(0.3), here.row_px.at(0.3)},
+                                             scan.pixel_spacing_mm);
+  const auto largest_around = [&](const test::Ball& ball) {
+    const Eigen::Vector2d pixel = camera.project(ball.center_mm);
+    const double radius = 1.6 * ball.radius_mm / scan.pixel_spacing_mm.x() + 2.0;
+    double largest = 0.0;
+    for (int row = 0; row < scan.size_px.y(); ++row)
+      for (int column = 0; column < scan.size_px.x(); ++column)
+        if ((Eigen::Vector2d(column, row) - pixel).norm() < radius)
+          largest = std::max(
+              largest,
+              std::abs(static_cast<double>(
+                  alignment.residual[static_cast<std::size_t>(row * scan.size_px.x() + column)])));
+    return largest;
+  };
+  EXPECT_LT(largest_around(bone), 6.0);
+  EXPECT_GT(largest_around(moving), 6.0);
 }
 
 TEST(ViewAlignment, SaysHowMuchOfAShiftNoiseOfThePredictionLetsThrough) {
