@@ -1,0 +1,186 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Tables whose rows are rows of a CSV of docs/data: every row of such a table says what a row of a CSV does to which its
+section links, cell by cell. Which tables are of this kind is told by their headers.
+
+Usage: rows.py ROOT               names rows that no linked CSV has
+       rows.py --print KIND CSV   the rows of a CSV as a page has them: KIND is one of population, uncertainty, peers
+       rows.py --self-test
+"""
+import csv
+import math
+import re
+import sys
+import tempfile
+from pathlib import Path
+
+from links import outside_fences
+from tables import cells_of, pages_of
+
+LINK = re.compile(r"\]\(([\w./-]*data/[\w-]+\.csv)\)")
+
+
+def number(row, column):
+    return float(row[column]) if row[column] not in ("", "-") else math.nan
+
+
+def fixed(value, digits, scale=1.0, unit=""):
+    return "-" if math.isnan(value) else f"{scale * value:.{digits}f}{unit}"
+
+
+def population_cells(row):
+    """Of af-evaluate population: by TRE; conditions of one view by mRPD."""
+    error = "mrpd" if re.search(r"-1-", row["condition"]) else "tre"
+
+    def of(column):
+        return number(row, f"{error}_{column}")
+
+    starts = int(row["starts"])
+    ends_whole = "" if row[f"{error}_capture_ended_by"] == "failures" else ">= "
+    mean_whole = ">= " if of("patients_capture_lower_bounds") > 0 else ""
+    low, high = of("share_with_failures_low"), of("share_with_failures_high")
+    return [
+        row["patients"],
+        f"{row[f'{error}_successes']} of {starts}",
+        f"{100 * of('rate'):.1f} ({100 * of('bootstrap_low'):.1f} to {100 * of('bootstrap_high'):.1f})",
+        f"{row[f'{error}_patients_with_failures']}: {100 * low:.1f} to {100 * high:.1f}",
+        f"{100 * of('worst_patient_rate'):.1f}",
+        f"{100 * of('below_1_mm') / starts:.1f} / {100 * of('below_5_mm') / starts:.1f}",
+        f"{ends_whole}{of('capture_mm'):.0f} ({of('capture_bootstrap_low_mm'):.0f} to {of('capture_bootstrap_high_mm'):.0f})",
+        f"{mean_whole}{of('patients_capture_mean_mm'):.1f}",
+        fixed(number(row, "median_tre_mm"), 2),
+    ]
+
+
+def with_interval(row, column, digits, scale=1.0, unit=""):
+    low, high = number(row, f"{column}_low"), number(row, f"{column}_high")
+    text = fixed(number(row, column), digits, scale, unit)
+    if text == "-" or math.isnan(low) or low == high:
+        return text
+    return f"{text} ({scale * low:.{digits}f} to {scale * high:.{digits}f})"
+
+
+def uncertainty_cells(row):
+    """Of jobs/uncertainty.py --csv."""
+    return [
+        row["cases"],
+        with_interval(row, "pose_region", 1, 100.0, " %"),
+        fixed(number(row, "sandwich_alone"), 1, 100.0, " %"),
+        with_interval(row, "tre_region", 1, 100.0, " %"),
+        f"{row['failures']} / {row['successes']}",
+        with_interval(row, "roc_area", 3),
+        fixed(number(row, "sure_failures"), 1, 100.0, " %"),
+    ]
+
+
+def peers_cells(row):
+    """Of jobs/peers.sh; 'pays after' has its unit in the first row of a table alone."""
+    return [
+        row["method"].removesuffix("-nelder-mead"),
+        {"autodiff": "PyTorch"}.get(row["drrs"], row["drrs"].removesuffix("-nelder-mead")),
+        f"{row['successes']} of {row['starts']}",
+        fixed(number(row, "median_tre_mm"), 2, unit=" mm"),
+        f"{number(row, 'median_seconds'):.2g} s",
+        row["pays_after"],
+    ]
+
+
+# By kind: a header's cell that no other table has, the cells of a CSV's row, and which cell of the page's they begin at.
+KINDS = {
+    "population": ("Patients' own, mean, mm", population_cells, 1),
+    "uncertainty": ("Failures with 0.9 or more", uncertainty_cells, 1),
+    "peers": ("A field pays for itself after", peers_cells, 1),
+}
+
+
+def bare(cells):
+    return [cell.replace("`", "").removesuffix(" registrations") for cell in cells]
+
+
+def sections_of(text):
+    """(heading, its lines with their numbers) of a page."""
+    heading, lines = "", []
+    for line_number, line in enumerate(outside_fences(text), 1):
+        title = re.match(r"#{1,6}\s+(.*)", line)
+        if title:
+            yield heading, lines
+            heading, lines = title.group(1), []
+        lines.append((line_number, line))
+    yield heading, lines
+
+
+def rows_without_csv(page):
+    """(line, row) of every row of a known kind that is no row of a CSV of its section; and how many rows there are."""
+    wrong, count = [], 0
+    for _, lines in sections_of(page.read_text(encoding="utf-8")):
+        files = [page.parent / link for _, line in lines for link in LINK.findall(line)]
+        kind = None
+        for line_number, line in lines:
+            if not line.startswith("|"):
+                kind = None
+                continue
+            cells = cells_of(line)
+            named = [k for k in KINDS.values() if k[0] in cells]
+            if named:
+                kind, known = named[0], []
+                for file in files:
+                    for row in csv.DictReader(file.open(newline="", encoding="utf-8")):
+                        try:
+                            known.append(bare(kind[1](row)))
+                        except KeyError:  # a CSV of another kind
+                            break
+            elif kind and not re.fullmatch(r":?-+:?", cells[0]):
+                count += 1
+                if bare(cells[kind[2] :]) not in known:
+                    wrong.append((line_number, line))
+    return wrong, count
+
+
+def check(root):
+    found = checked = 0
+    for path, page in pages_of(root).items():
+        wrong, count = rows_without_csv(page)
+        checked += count
+        for line_number, line in wrong:
+            print(f"{path}:{line_number}: no linked CSV has this row: {line[:150]}")
+        found += len(wrong)
+    if checked == 0:
+        print("no page has a table of a known kind")
+        found = 1
+    return found
+
+
+def self_test():
+    with tempfile.TemporaryDirectory() as folder:
+        page = Path(folder) / "page.md"
+        (Path(folder) / "data").mkdir()
+        (Path(folder) / "data" / "some.csv").write_text(
+            "case,method,drrs,starts,successes,median_tre_mm,median_seconds,pays_after\n"
+            "a,robust,ray casting,40,39,0.1166,0.03432,378\n",
+            encoding="utf-8",
+        )
+        table = (
+            "## T\n[data](data/some.csv)\n\n| X | Method | DRRs | Right | TRE | Time | A field pays for itself after |\n"
+            "|---|---|---|---|---|---|---|\n| a | `robust` | ray casting | {} of 40 | 0.12 mm | 0.034 s | 378 registrations |\n"
+        )
+        for right, expected in ((39, 0), (38, 1)):
+            page.write_text(table.format(right), encoding="utf-8")
+            assert (len(rows_without_csv(page)[0]), rows_without_csv(page)[1]) == (expected, 1), right
+    print("ok")
+
+
+def print_rows(kind, path):
+    with open(path, newline="", encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            print("| " + " ".join(list(row.values())[:6]) + " | " + " | ".join(KINDS[kind][1](row)) + " |")
+
+
+if __name__ == "__main__":
+    if sys.argv[1:] == ["--self-test"]:
+        self_test()
+    elif len(sys.argv) == 4 and sys.argv[1] == "--print" and sys.argv[2] in KINDS:
+        print_rows(*sys.argv[2:])
+    elif len(sys.argv) == 2 and Path(sys.argv[1]).is_dir():
+        sys.exit(1 if check(Path(sys.argv[1])) else 0)
+    else:
+        sys.exit(__doc__)
