@@ -87,10 +87,11 @@ mkdir -p "$output/fields" "$output/starts" "$output/runs" "$output/finishes"
 
 say "Geometry of the scan: $scan"
 # Lists of angles and of files stand beside the scan's file.
-lists=$(sed -nE 's/^ *(angles|files)_file *= *"([^"]*)".*/\2/p' "$scan")
+lists=$(sed -nE "s/^[[:space:]]*(angles|files)_file[[:space:]]*=[[:space:]]*[\"']([^\"']*)[\"'].*/\2/p" "$scan")
 stage_inputs="$(sha256sum <"$scan") $(state_of "$folder")"
 while IFS= read -r list; do
-  [[ -z "$list" ]] || stage_inputs+=" $(cd "$(dirname "$scan")" && sha256sum <"$list")"
+  # af-scan says what is wrong with a list that is missing.
+  if [[ -n "$list" && -f "$(dirname "$scan")/$list" ]]; then stage_inputs+=" $(sha256sum <"$(dirname "$scan")/$list")"; fi
 done <<<"$lists"
 study="$output/study/study.toml"
 stage "scan" "$study" "$bin/af-scan" --scan "$scan" --folder "$folder" --pairs "$pairs" --seed "$seed" --enlarge-small \
@@ -163,6 +164,6 @@ if ((${#finish_folders[@]} > 0)); then
   say "Tables: $output/finishes.md, $output/distances.md"
 fi
 "$bin/af-evaluate" report -o "$output/report.html" "$output/runs"
-grep -E '^(enlarged|(gold|stated)_residual|(stated_)?source_to_detector_mm)' "$output/study/calibration.toml" | sed 's/^/  /'
-grep '^Warning' "$output/logs/scan.log" | sed 's/^/  /' || true
+grep -E '^(enlarged|(gold|stated)_residual|(stated_)?source_to_detector_mm|largest_masked_share)' "$output/study/calibration.toml" | sed 's/^/  /'
+awk '/^Warning/ && !seen[$0]++ { print "  " $0 }' "$output/logs/scan.log"
 say "Report: $output/report.html; pictures of the X-rays: $output/study/view-*.png"

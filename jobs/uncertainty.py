@@ -293,13 +293,13 @@ def reliability(rows):
     return lines
 
 
-def fitted_constants(rows, measures):
+def fitted_constants(rows, measures, which="drawn, in the other folds"):
     """Those of the covariance and of TREs by measure, and those of the confidence, that fit these rows."""
     inflations = {}
     for measure in measures:
         fitted = [r for r in rows if r.measure == measure and r.is_success and not math.isnan(r.distance)]
         if not fitted:
-            refuse(measure, "no registration of a patient to fit succeeded and says how far it may be off; --judge fits nothing")
+            refuse(measure, f"no registration of a patient to fit ({which}) succeeded and says how far it may be off; --judge fits nothing")
         # Never less than the sandwich itself, which holds where the pose explains the X-rays. A TRE adds up what all six
         # directions do, and may be foretold too large.
         pose = fit_inflation(fitted, [row.distance / REGION_95 for row in fitted], 0.0)
@@ -331,22 +331,32 @@ def foretell(rows, constants):
 
 
 def fit_to_odd_half(rows, measures):
-    constants = fitted_constants([row for row in rows if row.is_for_fit], measures)
+    constants = fitted_constants([row for row in rows if row.is_for_fit], measures, "of odd number")
     print_constants(constants, rows[0].views)
     foretell(rows, constants)
 
 
+def folds_of(kinds, folds):
+    """The fold of every patient, given their kinds."""
+    ranks, fold_of = {}, {}
+    for patient in sorted(kinds):
+        ranks[kinds[patient]] = ranks.get(kinds[patient], -1) + 1
+        fold_of[patient] = ranks[kinds[patient]] % folds
+    return fold_of
+
+
 def cross_validate(rows, measures, folds):
-    """Prints the constants that fit all drawn patients. Each of them is foretold by those of the others: every fold has the
-    patients whose numbers leave the same rest; patients that were not drawn are foretold by the constants of all."""
+    """Prints the constants that fit all drawn patients. Each of them is foretold by those of the others: every fold has as
+    many patients of every kind; patients that were not drawn are foretold by the constants of all."""
     drawn = [row for row in rows if row.number is not None]
     constants = fitted_constants(drawn, measures)
     print_constants(constants, rows[0].views)
     foretell([row for row in rows if row.number is None], constants)
+    fold_of = folds_of({row.patient: row.kind() for row in drawn}, folds)
     for fold in range(folds):
-        mine = [row for row in drawn if row.number % folds == fold]
+        mine = [row for row in drawn if fold_of[row.patient] == fold]
         if mine:
-            foretell(mine, fitted_constants([row for row in drawn if row.number % folds != fold], measures))
+            foretell(mine, fitted_constants([row for row in drawn if fold_of[row.patient] != fold], measures))
     for row in rows:
         row.is_for_fit = False
 

@@ -238,20 +238,17 @@ void refuse_shadow_at_one_side(const LinesAcross& lines,
                          std::string(kGiveFlat));
 }
 
-/// Whether pixels that see air vary from view to view far less than the other lit ones, which the
-/// object passes.
-bool is_steadier_in_air(const PixelStatistics& statistics, const AirLevel& level) {
+/// Whether the pixels taken for air have the same share of the flat: half of them within 1 %. What
+/// an object lets through where it is thinnest changes from place to place.
+bool is_even_in_air(const AirLevel& level, const std::vector<double>& ratios) {
   std::vector<float> in_air;
-  std::vector<float> elsewhere;
-  for (std::size_t i = 0; i < level.is_lit.size(); ++i) {
-    if (level.is_lit[i] == 0) continue;
-    const float variation =
-        statistics.deviation.pixels[i] / std::max(statistics.mean.pixels[i], 1e-6F);
-    (level.is_air[i] != 0 ? in_air : elsewhere).push_back(variation);
-  }
-  if (in_air.empty() || elsewhere.empty()) return false;
-  constexpr float kMuchSteadier = 0.25F;
-  return percentile(std::move(in_air), 0.5) < kMuchSteadier * percentile(std::move(elsewhere), 0.5);
+  for (std::size_t i = 0; i < ratios.size(); ++i)
+    if (level.is_air[i] != 0) in_air.push_back(static_cast<float>(ratios[i]));
+  if (in_air.empty()) return false;
+  constexpr float kEven = 0.01F;
+  const float low = percentile(in_air, 0.25);
+  const float high = percentile(std::move(in_air), 0.75);
+  return high - low < kEven * high;
 }
 
 std::size_t count_of(const std::vector<unsigned char>& flags) {
@@ -341,10 +338,11 @@ AirLevel air_level_of_flat(const Image2d& flat, const PixelStatistics& statistic
     if (level.is_lit[i] != 0) lit.push_back(static_cast<float>(ratios[i]));
   if (lit.empty()) throw InputError("flat", "all dark", "must show the open beam");
   const auto open = static_cast<double>(percentile(std::move(lit), 0.98));
+  level.brightest_share = open;
   for (std::size_t i = 0; i < ratios.size(); ++i)
     if (level.is_lit[i] != 0 && std::abs(ratios[i] - open) <= kSameAsFlat * open)
       level.is_air[i] = 1;
-  if (std::abs(open - 1.0) > kSameExposure && !is_steadier_in_air(statistics, level))
+  if (std::abs(open - 1.0) > kSameExposure && !is_even_in_air(level, ratios))
     std::fill(level.is_air.begin(), level.is_air.end(), 0);
   return level;
 }
@@ -357,7 +355,7 @@ double beam_of(const Image2d& counts, const AirLevel& level) {
       seen += static_cast<double>(counts.pixels[i]);
       air += static_cast<double>(level.air.pixels[i]);
     }
-  return air > 0.0 && seen > 0.0 ? seen / air : 1.0;
+  return air > 0.0 ? seen / air : 1.0;
 }
 
 double least_count_of(const AirLevel& level) {

@@ -16,6 +16,7 @@ struct AirLevel {
   Image2d air;
   std::vector<unsigned char> is_lit;  ///< 0: behind the aperture, per pixel
   std::vector<unsigned char> is_air;  ///< 1: no view of the object shadows it, per pixel
+  double brightest_share = 1.0;       ///< of the flat, in the brightest pixels; 1 without a flat
 };
 
 /// How the views' pixels were sampled over time: mean and standard deviation per pixel, above the
@@ -38,13 +39,13 @@ AirLevel estimated_air_level(const PixelStatistics& statistics, AxisAlong axis_a
 
 /// The air level of a flat image (counts above dark). Pixels that see air are found from the scan's
 /// statistics: those whose share of the flat is within 5 % of the brightest, if that is within 0.9
-/// and 1.1, or if they vary from view to view far less than the others do: the flat may be of
-/// another exposure. An object that reaches beyond the detector leaves no air; then the beam is
-/// taken to be the flat's. \test LineIntegrals.FromAFlatOfAnotherExposureAreThoseOfTheObject
+/// and 1.1, or if their shares are the same to 1 %: the flat may be of another exposure. An object
+/// that reaches beyond the detector leaves no air; then the beam is taken to be the flat's. \test
+/// LineIntegrals.FromAFlatOfAnotherExposureAreThoseOfTheObject
 AirLevel air_level_of_flat(const Image2d& flat, const PixelStatistics& statistics);
 
 /// A view's mean ratio of counts to air over the pixels that see air: the tube's output changes
-/// from view to view. 1 where no pixel sees air.
+/// from view to view. 1 where no pixel sees air; 0 or less of a view that counts nothing.
 double beam_of(const Image2d& counts, const AirLevel& level);
 
 /// What a pixel without any counts stands for under the logarithm: half a count; where the open

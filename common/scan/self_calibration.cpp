@@ -381,10 +381,13 @@ HeldOutResidual held_out_residual(const ScanImages& images,
       scan.pixel_spacing_mm.maxCoeff() * scan.source_to_axis_mm / calibration.source_to_detector_mm;
   for (const JudgedView& view : residual.views) {
     residual.rms_px += view.shift_px.squaredNorm();
+    residual.rotation_rms_rad += view.alignment.rotation_rad * view.alignment.rotation_rad;
     residual.cost += view.alignment.cost;
   }
   residual.rms_px = std::sqrt(residual.rms_px / static_cast<double>(judged.size()));
   residual.rms_mm_at_axis = residual.rms_px * mm_per_px;
+  residual.rotation_rms_rad =
+      std::sqrt(residual.rotation_rms_rad / static_cast<double>(judged.size()));
   residual.cost /= static_cast<double>(judged.size());
   return residual;
 }
@@ -439,11 +442,6 @@ ScanCalibration self_calibrate(const ScanImages& images,
     best = before;
     if (outcome.step_px < kSmallStepPx) break;
   }
-  constexpr double kMuchUnexplained = 0.25;
-  if (lowest > kMuchUnexplained)
-    report(
-        "Warning: views predict little of each other's detail (cost " + std::to_string(lowest) +
-        "): the object reaches far beyond the detector or moves, or the stated geometry is wrong");
   return best.binned(1.0 / bin);
 }
 

@@ -48,9 +48,10 @@ struct JudgedView {
 /// What held-out views say of a calibration.
 struct HeldOutResidual {
   std::vector<JudgedView> views;
-  double rms_px = 0.0;          ///< length of the shift, root mean square over the views
-  double rms_mm_at_axis = 0.0;  ///< the same where the axis is
-  double cost = 0.0;            ///< mean over the views, see ViewAlignment
+  double rms_px = 0.0;            ///< length of the shift, root mean square over the views
+  double rms_mm_at_axis = 0.0;    ///< the same where the axis is
+  double rotation_rms_rad = 0.0;  ///< likewise, of the detector's rotation in its plane
+  double cost = 0.0;              ///< mean over the views, see ViewAlignment
 };
 
 /// Predicts the `judged` views from a reconstruction of the `used` ones and compares. Pixels whose

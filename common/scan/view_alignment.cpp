@@ -107,8 +107,8 @@ std::vector<double> squares_around(const Image2d& image) {
   return means;
 }
 
-/// ViewAlignment::residual. Edges of what stands still are predicted to some tenths of themselves;
-/// what moved leaves all of its detail where it is, or where it was.
+/// ViewAlignment::residual. Edges of what stands still are predicted to a tenth of the detail
+/// around; what moved leaves all of its detail where it is, or where it was.
 std::vector<float> residual_over_expected(const std::vector<std::size_t>& pixels,
                                           const Image2d& predicted,
                                           const Residuals& residuals) {
@@ -184,6 +184,7 @@ ViewAlignment align_view(const Image2d& measured,
   alignment.right = right.head<kViewParameters>() - with_gain * right[3] / gain_square;
   const Eigen::Matrix2d shift_normal = alignment.normal.topLeftCorner<2, 2>();
   alignment.shift_px = shift_normal.ldlt().solve(Eigen::Vector2d(alignment.right.head<2>()));
+  alignment.rotation_rad = alignment.normal.ldlt().solve(alignment.right)[2];
   alignment.response = slopes_product.cwiseQuotient(slopes_square);
   alignment.cost = relative_cost(pixels, measured, residuals);
   alignment.gain = residuals.gain;

@@ -22,6 +22,7 @@ struct ViewAlignment {
   ViewMatrix normal = ViewMatrix::Zero();  ///< of the parameters, weights and 1 / variance included
   ViewVector right = ViewVector::Zero();   ///< normal * step = right
   Eigen::Vector2d shift_px = Eigen::Vector2d::Zero();  ///< column, row alone, without rotation
+  double rotation_rad = 0.0;                           ///< of all three together
   /// The share of a shift that noise of the prediction lets through, for column and row: the slope
   /// of measured on predicted gradients. Shifts are divided by it.
   Eigen::Vector2d response = Eigen::Vector2d::Ones();

@@ -95,7 +95,7 @@ constexpr const char* kScanText =
 # the camera turns the other way: change the sign. Pixels are (column, row), the first is 0, integers are pixel centres.
 # Keys behind a '#' are optional.
 name = "my-scan"                                 # letters, digits, - and _
-source_to_axis_mm = 308.7                        # SOD, SAD, SID
+source_to_axis_mm = 308.7                        # SOD, SAD; RTK: SID. Not from source to image
 axis_to_detector_mm = 149.0                      # SDD - SOD: from the axis on to the detector, not from the source
 # distance_tolerance = 0.1                       # the detector may stand so far off, as a share; without it it was measured
 pixel_spacing_mm = [0.37, 0.37]                  # of columns and rows, on the detector
@@ -110,7 +110,7 @@ step_deg = 1.0                                   # below 0: the other way round
 # first_angle_deg = 0.0
 
 # The images: PNG, TIFF, MetaImage, NRRD, NIfTI or DICOM, all in one folder. {} is the index of the file, {:04} with four
-# digits. A name without braces is one file of all views. Or files_file = "files.txt" beside this file, a name per view.
+# digits. A name without braces is one file of all views. Or files_file = "files.txt" beside this file, a line per view.
 files = "Projection{}.png"
 # first_index = 0
 # index_step = 1                                 # 3: every third file is a view

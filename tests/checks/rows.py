@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """Tables whose rows are rows of a CSV of docs/data: every row of such a table says what a row of a CSV does to which its
-section links, cell by cell. Which tables are of this kind is told by their headers.
+section links, cell by cell, and is of the condition that its first cell names. Which tables are of this kind is told by
+their headers; a kind that no page has any more is an error.
 
 Usage: rows.py ROOT               names rows that no linked CSV has
        rows.py --print KIND CSV   the rows of a CSV as a page has them: KIND is one of population, uncertainty, peers
@@ -26,6 +27,16 @@ def number(row, column):
 
 def fixed(value, digits, scale=1.0, unit=""):
     return "-" if math.isnan(value) else f"{scale * value:.{digits}f}{unit}"
+
+
+def views_words(views):
+    return "two views" if int(views) == 2 else "one view"
+
+
+def population_words(row):
+    """What the first cell of a row says."""
+    xrays, views, preset = row["condition"].split("-")[:3]
+    return [{"clean": "clean", "all": "all stresses"}[xrays], views_words(views), preset]
 
 
 def population_cells(row):
@@ -60,6 +71,16 @@ def with_interval(row, column, digits, scale=1.0, unit=""):
     return f"{text} ({scale * low:.{digits}f} to {scale * high:.{digits}f})"
 
 
+def uncertainty_words(row):
+    """... of a row that begins with '...' views are those of a row above."""
+    measure, _, group = row["measure"].partition(", ")
+    presets = row["presets"].split(",")
+    every = "all three" if len(presets) == 3 else "both" if len(presets) == 2 else presets[0]
+    words = [{"rg": "robust", "gc": "fast", "mi": "paper", "all": every}[measure], f"|{views_words(row['views'])}"]
+    groups = {"clean": "clean", "all": "all stresses", "head": "heads", "pelvis": "pelves", "spine": "spines"}
+    return words + [groups[group]] if group in groups else words
+
+
 def uncertainty_cells(row):
     """Of jobs/uncertainty.py --csv."""
     return [
@@ -71,6 +92,10 @@ def uncertainty_cells(row):
         with_interval(row, "roc_area", 3),
         fixed(number(row, "sure_failures"), 1, 100.0, " %"),
     ]
+
+
+def peers_words(row):
+    return []  # the cells themselves name method and DRRs
 
 
 def peers_cells(row):
@@ -85,11 +110,11 @@ def peers_cells(row):
     ]
 
 
-# By kind: a header's cell that no other table has, the cells of a CSV's row, and which cell of the page's they begin at.
+# By kind: header's cells that no other table has, what the first cell says of a CSV's row, and the cells after it.
 KINDS = {
-    "population": ("Patients' own, mean, mm", population_cells, 1),
-    "uncertainty": ("Failures with 0.9 or more", uncertainty_cells, 1),
-    "peers": ("A field pays for itself after", peers_cells, 1),
+    "population": (("Patients' own, mean, mm", "CTs' own, mean, mm"), population_words, population_cells),
+    "uncertainty": (("Failures with 0.9 or more",), uncertainty_words, uncertainty_cells),
+    "peers": (("A field pays for itself after",), peers_words, peers_cells),
 }
 
 
@@ -109,9 +134,25 @@ def sections_of(text):
     yield heading, lines
 
 
+def says(label, words):
+    """Whether a first cell names a condition: a word behind '|' only where the label names views itself."""
+    return all(word.lstrip("|") in label or (word[0] == "|" and label.startswith("...")) for word in words)
+
+
+def rows_of_csv(file, kind):
+    """(words, cells) of its rows; none of a CSV of another kind."""
+    _, words_of, cells_of_row = KINDS[kind]
+    with open(file, newline="", encoding="utf-8") as text:
+        try:
+            return [(words_of(row), bare(cells_of_row(row))) for row in csv.DictReader(text)]
+        except KeyError:
+            return []
+
+
 def rows_without_csv(page):
-    """(line, row) of every row of a known kind that is no row of a CSV of its section; and how many rows there are."""
-    wrong, count = [], 0
+    """(line, row) of every row of a known kind that is no row of a CSV of its section; and how many rows of each kind there
+    are."""
+    wrong, counts = [], dict.fromkeys(KINDS, 0)
     for _, lines in sections_of(page.read_text(encoding="utf-8")):
         files = [page.parent / link for _, line in lines for link in LINK.findall(line)]
         kind = None
@@ -120,33 +161,30 @@ def rows_without_csv(page):
                 kind = None
                 continue
             cells = cells_of(line)
-            named = [k for k in KINDS.values() if k[0] in cells]
+            named = [k for k, (headers, _, _) in KINDS.items() if set(headers) & set(cells)]
             if named:
-                kind, known = named[0], []
-                for file in files:
-                    for row in csv.DictReader(file.open(newline="", encoding="utf-8")):
-                        try:
-                            known.append(bare(kind[1](row)))
-                        except KeyError:  # a CSV of another kind
-                            break
+                kind = named[0]
+                known = [row for file in files for row in rows_of_csv(file, kind)]
             elif kind and not re.fullmatch(r":?-+:?", cells[0]):
-                count += 1
-                if bare(cells[kind[2] :]) not in known:
+                counts[kind] += 1
+                if not any(bare(cells[1:]) == row and says(cells[0], words) for words, row in known):
                     wrong.append((line_number, line))
-    return wrong, count
+    return wrong, counts
 
 
 def check(root):
-    found = checked = 0
+    found, checked = 0, dict.fromkeys(KINDS, 0)
     for path, page in pages_of(root).items():
-        wrong, count = rows_without_csv(page)
-        checked += count
+        wrong, counts = rows_without_csv(page)
+        for kind, count in counts.items():
+            checked[kind] += count
         for line_number, line in wrong:
             print(f"{path}:{line_number}: no linked CSV has this row: {line[:150]}")
         found += len(wrong)
-    if checked == 0:
-        print("no page has a table of a known kind")
-        found = 1
+    for kind, count in checked.items():
+        if count == 0:
+            print(f"no page has a table of {kind}: was its header changed?")
+            found += 1
     return found
 
 
@@ -165,14 +203,23 @@ def self_test():
         )
         for right, expected in ((39, 0), (38, 1)):
             page.write_text(table.format(right), encoding="utf-8")
-            assert (len(rows_without_csv(page)[0]), rows_without_csv(page)[1]) == (expected, 1), right
+            wrong, counts = rows_without_csv(page)
+            assert (len(wrong), counts["peers"]) == (expected, 1), right
+    robust = {"measure": "rg, all", "presets": "robust,fast", "views": "1"}
+    assert says("one view, `robust`, all stresses", uncertainty_words(robust))
+    assert says("... `robust`, all stresses", uncertainty_words(robust))
+    for label in ("one view, `fast`, all stresses", "two views, `robust`, all stresses", "one view, `robust`, clean"):
+        assert not says(label, uncertainty_words(robust)), label
+    swapped = population_words({"condition": "all-2-fast"})
+    assert says("all stresses, two views, `fast`", swapped) and not says("all stresses, two views, `robust`", swapped)
     print("ok")
 
 
 def print_rows(kind, path):
     with open(path, newline="", encoding="utf-8") as file:
         for row in csv.DictReader(file):
-            print("| " + " ".join(list(row.values())[:6]) + " | " + " | ".join(KINDS[kind][1](row)) + " |")
+            _, words_of, cells_of_row = KINDS[kind]
+            print("| " + ", ".join(words_of(row)) + " | " + " | ".join(cells_of_row(row)) + " |")
 
 
 if __name__ == "__main__":

@@ -113,6 +113,19 @@ std::vector<PlacedWord> words_of_file(const std::filesystem::path& path) {
   return found;
 }
 
+/// The lines without the blanks around them, which are not empty; # at the beginning is a comment.
+std::vector<std::string> lines_of_file(const std::filesystem::path& path) {
+  std::istringstream text(read_text_file(path, kMostTomlBytes));
+  std::vector<std::string> found;
+  constexpr const char* kBlanks = " \t\r";
+  for (std::string line; std::getline(text, line);) {
+    const std::size_t begin = line.find_first_not_of(kBlanks);
+    if (begin == std::string::npos || line[begin] == '#') continue;
+    found.push_back(line.substr(begin, line.find_last_not_of(kBlanks) + 1 - begin));
+  }
+  return found;
+}
+
 std::vector<double> read_angles_file(const std::filesystem::path& path) {
   std::vector<double> angles_deg;
   for (const auto& [word, place] : words_of_file(path)) {
@@ -162,13 +175,12 @@ void read_listed_files(TomlTableReader& reader,
     if (reader.has(key)) reader.add_problem(key, "must not be given together with files_file");
   const auto list = reader.get_string("files_file", Presence::Required);
   if (!list) return;
-  for (const PlacedWord& name : words_of_file(folder / *list))
-    file.listed_files.push_back(name.word);
+  file.listed_files = lines_of_file(folder / *list);
   if (file.listed_files.size() != file.scan.angles_rad.size())
     reader.add_problem(
         "files_file",
-        "must hold a file name per view: " + std::to_string(file.listed_files.size()) + " for " +
-            std::to_string(file.scan.angles_rad.size()) + " views");
+        "must hold a line with a file name per view: " + std::to_string(file.listed_files.size()) +
+            " for " + std::to_string(file.scan.angles_rad.size()) + " views");
 }
 
 /// Names by a pattern, or of a stack.

@@ -44,8 +44,9 @@ void ScanOptions::describe(Fields& field) {
       .within(0.0, 100.0);
   field("mask_deviations",
         mask_deviations,
-        "Places where an X-ray differs from its prediction by more than so many robust standard "
-        "deviations are masked: something moved during the scan; 0: no masks")
+        "Places where an X-ray differs from its prediction by more than so many times what is "
+        "expected there (its robust standard deviation, and a tenth of the predicted detail) are "
+        "masked: something moved during the scan; 0: no masks")
       .within(0.0, 1000.0);
   field("write_projections",
         writes_projections,

@@ -53,9 +53,9 @@ void refuse_other_count(const ScanFile& file, const fs::path& folder) {
   if (!file.listed_files.empty()) return;
   const fs::path next = folder / file.file_of(count);
   if (fs::exists(next))
-    throw InputError("view_count",
+    throw InputError("views",
                      std::to_string(count),
-                     "must count all views, but " + next.string() +
+                     "must be all that there are, but " + next.string() +
                          " exists, too (to leave views out, name the others in files_file)");
 }
 
@@ -131,7 +131,14 @@ void report_beam(const ScanFile& file,
   const double air_share = share_of(level.is_air);
   const bool has_flat = file.flat || file.flat_level;
   if (air_share == 0.0) {
-    report("Open beam: no pixel sees past the object in all views; the flat's exposure is taken");
+    constexpr double kSameExposure = 0.1;
+    report(
+        "Open beam: no pixel is seen to see past the object in all views; the flat's exposure "
+        "is taken");
+    if (std::abs(level.brightest_share - 1.0) > kSameExposure)
+      report("Warning: the brightest pixels have " + fixed_text(level.brightest_share, 2) +
+             " of the flat. If they see air, the flat is of another exposure, and all line "
+             "integrals are off: scale it, or state flat_level");
     return;
   }
   report("Open beam: " +

@@ -70,7 +70,11 @@ void run_scan(const ScanOptions& options,
   const std::filesystem::path images_folder =
       options.folder.empty() ? std::filesystem::absolute(options.scan).parent_path()
                              : options.folder;
-  const auto report = [&](const std::string& line) { inform(world, line); };
+  std::string warnings;  // said again in the end: much may have been printed since
+  const auto report = [&](const std::string& line) {
+    inform(world, line);
+    if (line.starts_with("Warning")) warnings += "\n" + line;
+  };
   report("Reading " + std::to_string(file.scan.angles_rad.size()) + " views of " + file.name);
   ScanImages images = read_scan_images(file, images_folder, options.most_px, pool, report);
   const CalibratedScan scan =
@@ -83,7 +87,8 @@ void run_scan(const ScanOptions& options,
                                  {{"ct_content", ct_content_sha256(scan.ct)}}};
   const std::string found = write_scan_study(options, scan, provenance, folder.path());
   folder.commit();
-  std::cout << found << "\nStudy: " << (folder.final_path() / "study.toml").string() << '\n';
+  std::cout << found << warnings << "\nStudy: " << (folder.final_path() / "study.toml").string()
+            << '\n';
 }
 
 }  // namespace af::tools

@@ -153,7 +153,7 @@ void write_view_picture(const CalibratedScan& scan,
                              -6.0,
                              6.0,
                              "measured - predicted",
-                             "robust standard deviations",
+                             "over what is expected",
                              Colors::Diverging,
                              {region}};
   write_picture({measured, used, rest},
@@ -228,7 +228,7 @@ std::string series_text(const char* key, const AngleSeries& series) {
   return std::string(key) + " = " + toml_numbers(series.coefficients) + "\n";
 }
 
-std::string calibration_text(const CalibratedScan& scan) {
+std::string calibration_text(const CalibratedScan& scan, double most_masked) {
   const ScanCalibration& found = scan.calibration;
   const HeldOutResidual& after = scan.calibrated;
   std::string text =
@@ -249,8 +249,12 @@ std::string calibration_text(const CalibratedScan& scan) {
   text += "water_mu_per_mm = " + toml_number(scan.water_mu_per_mm) + "\n";
   text +=
       "held_out_cost = " + toml_number(after.cost) + "  # of the odd views' detail, unexplained\n";
+  text += "largest_masked_share = " + toml_number(most_masked) + "  # of an X-ray's region\n";
   text += "gold_residual_px = " + toml_number(after.rms_px) + "\n";
   text += "gold_residual_mm_at_axis = " + toml_number(after.rms_mm_at_axis) + "\n";
+  text += "gold_residual_rotation_deg = " + toml_number(after.rotation_rms_rad * kDegPerRad) + "\n";
+  text += "stated_residual_rotation_deg = " +
+          toml_number(scan.as_stated.rotation_rms_rad * kDegPerRad) + "\n";
   text += "stated_residual_px = " + toml_number(scan.as_stated.rms_px) + "\n";
   text += "stated_residual_mm_at_axis = " + toml_number(scan.as_stated.rms_mm_at_axis) + "\n";
   return text;
@@ -258,11 +262,13 @@ std::string calibration_text(const CalibratedScan& scan) {
 
 void write_held_out(const CalibratedScan& scan, const fs::path& path) {
   std::string text =
-      "view,angle_deg,column_shift_px,row_shift_px,gain,response_column,response_row\n";
+      "view,angle_deg,column_shift_px,row_shift_px,rotation_deg,gain,response_column,response_"
+      "row\n";
   for (const JudgedView& row : scan.calibrated.views) {
     const double angle = scan.images.scan.angles_rad[static_cast<std::size_t>(row.view)];
     text += std::to_string(row.view) + "," + number_text(angle * kDegPerRad) + "," +
             number_text(row.shift_px.x()) + "," + number_text(row.shift_px.y()) + "," +
+            number_text(row.alignment.rotation_rad * kDegPerRad) + "," +
             number_text(row.alignment.gain) + "," + number_text(row.alignment.response.x()) + "," +
             number_text(row.alignment.response.y()) + "\n";
   }
@@ -399,7 +405,7 @@ std::string write_scan_study(const ScanOptions& options,
   write_ct(scan.ct, folder / "ct.nii.gz");
   write_text_file(folder / "rig.toml", rig_to_toml(study.rig));
   write_text_file(folder / "study.toml", study_to_toml(study, folder));
-  write_text_file(folder / "calibration.toml", calibration_text(scan));
+  write_text_file(folder / "calibration.toml", calibration_text(scan, most_masked));
   write_held_out(scan, folder / "held-out.csv");
   write_text_file(folder / "provenance.json", to_json(provenance).dump(2) + "\n");
   write_reproduce_script(folder, provenance);
@@ -407,14 +413,14 @@ std::string write_scan_study(const ScanOptions& options,
          " held-out views: " + fixed_text(scan.calibrated.rms_px, 3) + " px, " +
          fixed_text(scan.calibrated.rms_mm_at_axis, 4) +
          " mm at the axis (as stated: " + fixed_text(scan.as_stated.rms_px, 3) + " px, " +
-         fixed_text(scan.as_stated.rms_mm_at_axis, 4) + " mm)" +
-         (scan.enlarged == 1 ? ""
-                             : "\nAll lengths are " + std::to_string(scan.enlarged) +
-                                   " times those of the scan's file, these, too") +
-         "\nDetector's distance from the source: " +
+         fixed_text(scan.as_stated.rms_mm_at_axis, 4) +
+         " mm)\nDetector's distance from the source: " +
          fixed_text(scan.calibration.source_to_detector_mm, 1) +
          " mm (stated: " + fixed_text(scan.images.scan.source_to_detector_mm, 1) +
          " mm); masked: at most " + fixed_text(100.0 * most_masked, 1) + " % of an X-ray" +
+         (scan.enlarged == 1 ? ""
+                             : "\nAll lengths are " + std::to_string(scan.enlarged) +
+                                   " times those of the scan's file, these, too") +
          warnings_of(scan, most_masked);
 }
 

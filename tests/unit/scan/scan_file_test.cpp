@@ -108,12 +108,14 @@ TEST(ScanFile, TakesAListOfFiles) {
   const std::string listed = with(pattern, "files_file = \"files.txt\"\n");
   std::string names;
   for (int view = 0; view < 120; ++view) names += "a" + std::to_string(3 * view) + ".tif\n";
+  names.replace(0, 6, " a 0.tif ");  // blanks within a name stay
   write_text_file(scratch / "files.txt", "# every third\n" + names);
   const ScanFile file = parse_scan_file(listed, scan);
   EXPECT_FALSE(file.is_stack());
+  EXPECT_EQ(file.file_of(0), "a 0.tif");
   EXPECT_EQ(file.file_of(2), "a6.tif");
   EXPECT_EQ(file.file_of(119), "a357.tif");
-  write_text_file(scratch / "files.txt", "a.tif b.tif");
+  write_text_file(scratch / "files.txt", "a.tif\nb.tif\n");
   EXPECT_THROW(parse_scan_file(listed, scan), InputError);
   EXPECT_THROW(parse_scan_file(with("first_index = 7", "files_file = \"files.txt\""), scan),
                InputError);
