@@ -442,6 +442,13 @@ ScanCalibration self_calibrate(const ScanImages& images,
     best = before;
     if (outcome.step_px < kSmallStepPx) break;
   }
+  // At full resolution noise would count, too.
+  constexpr double kMuchUnexplained = 0.25;
+  if (lowest > kMuchUnexplained)
+    report("Warning: views share little detail with their predictions (cost " +
+           std::to_string(lowest) +
+           "): the object reaches far beyond the detector or moves, or the stated geometry is "
+           "wrong (step_deg, rotation_axis, the files' order)");
   return best.binned(1.0 / bin);
 }
 

@@ -215,12 +215,6 @@ std::string warnings_of(const CalibratedScan& scan, double most_masked) {
       text += std::string("\nWarning: the views hardly show shifts along ") +
               (axis == 0 ? "columns" : "rows") + " (response " + fixed_text(response, 2) +
               "): the gold residual says little there";
-  constexpr double kMuchUnexplained = 0.25;
-  if (scan.calibrated.cost > kMuchUnexplained)
-    text += "\nWarning: held-out views share little detail with their predictions (cost " +
-            fixed_text(scan.calibrated.cost, 2) +
-            "): the object reaches far beyond the detector or moves, or the stated geometry is "
-            "wrong (step_deg, rotation_axis, the files' order)";
   return text;
 }
 
