@@ -238,14 +238,14 @@ void refuse_shadow_at_one_side(const LinesAcross& lines,
                          std::string(kGiveFlat));
 }
 
-/// Whether the pixels taken for air have the same share of the flat: half of them within 1 %. What
+/// Whether the pixels taken for air have the same share of the flat: half of them within 2 %. What
 /// an object lets through where it is thinnest changes from place to place.
 bool is_even_in_air(const AirLevel& level, const std::vector<double>& ratios) {
   std::vector<float> in_air;
   for (std::size_t i = 0; i < ratios.size(); ++i)
     if (level.is_air[i] != 0) in_air.push_back(static_cast<float>(ratios[i]));
   if (in_air.empty()) return false;
-  constexpr float kEven = 0.01F;
+  constexpr float kEven = 0.02F;
   const float low = percentile(in_air, 0.25);
   const float high = percentile(std::move(in_air), 0.75);
   return high - low < kEven * high;

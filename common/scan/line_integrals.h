@@ -39,7 +39,7 @@ AirLevel estimated_air_level(const PixelStatistics& statistics, AxisAlong axis_a
 
 /// The air level of a flat image (counts above dark). Pixels that see air are found from the scan's
 /// statistics: those whose share of the flat is within 5 % of the brightest, if that is within 0.9
-/// and 1.1, or if their shares are the same to 1 %: the flat may be of another exposure. An object
+/// and 1.1, or if their shares are the same to 2 %: the flat may be of another exposure. An object
 /// that reaches beyond the detector leaves no air; then the beam is taken to be the flat's. \test
 /// LineIntegrals.FromAFlatOfAnotherExposureAreThoseOfTheObject
 AirLevel air_level_of_flat(const Image2d& flat, const PixelStatistics& statistics);

@@ -130,8 +130,8 @@ void report_beam(const ScanFile& file,
   const double middle = sorted[sorted.size() / 2];
   const double air_share = share_of(level.is_air);
   const bool has_flat = file.flat || file.flat_level;
+  constexpr double kSameExposure = 0.1;
   if (air_share == 0.0) {
-    constexpr double kSameExposure = 0.1;
     report(
         "Open beam: no pixel is seen to see past the object in all views; the flat's exposure "
         "is taken");
@@ -145,7 +145,6 @@ void report_beam(const ScanFile& file,
          (has_flat ? fixed_text(middle, 3) + " times the flat (median of the views), by "
                    : std::string("fitted to ")) +
          fixed_text(100.0 * air_share, 1) + " % of the pixels, which see air in all views");
-  constexpr double kSameExposure = 0.1;
   if (has_flat && std::abs(middle - 1.0) > kSameExposure)
     report("Warning: the flat is of another exposure than the views");
   constexpr double kLeastShare = 0.2;
