@@ -7,19 +7,9 @@
 set -euo pipefail
 root=$1
 programs=$2
-export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_hwloc_base_binding_policy=none
-scratch=$(mktemp -d)
-trap 'rm -rf "$scratch"' EXIT
-cd "$scratch"
-# As installed, so that the jobs find these programs, whatever they were built as.
-mkdir -p prefix/libexec/attenuation-fields
-cp -r "$root/jobs" prefix/libexec/attenuation-fields/
-ln -s "$programs" prefix/bin
-
-fail() {
-  echo "FAILED: $*" >&2
-  exit 1
-}
+# shellcheck source=installed_jobs.sh
+source "$(dirname "${BASH_SOURCE[0]}")/installed_jobs.sh"
+enter_installed "$root" "$programs"
 
 small=(--patients 1 --kinds spine --poses 1 --starts 1 --intervals 2 --presets fast --variants clean --raycast-patients 0 --ranks 2)
 small+=(--field '--slabs 1 --uv-nodes 7 --st-nodes 61 --codewords 64')

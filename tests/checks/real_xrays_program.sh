@@ -7,18 +7,9 @@
 set -euo pipefail
 root=$1
 programs=$2
-export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_hwloc_base_binding_policy=none
-scratch=$(mktemp -d)
-trap 'rm -rf "$scratch"' EXIT
-cd "$scratch"
-mkdir -p prefix/libexec/attenuation-fields
-cp -r "$root/jobs" prefix/libexec/attenuation-fields/
-ln -s "$programs" prefix/bin
-
-fail() {
-  echo "FAILED: $*" >&2
-  exit 1
-}
+# shellcheck source=installed_jobs.sh
+source "$(dirname "${BASH_SOURCE[0]}")/installed_jobs.sh"
+enter_installed "$root" "$programs"
 
 cat >rig.toml <<'TOML'
 isocenter_point = [0.0, 0.0, 0.0]

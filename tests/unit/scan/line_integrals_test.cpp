@@ -46,6 +46,21 @@ struct Detector {
   }
 };
 
+/// Every tenth view as counted.
+std::vector<Image2d> twelve_views(const Detector& detector, const ScanImages& images) {
+  std::vector<Image2d> counts;
+  for (int view = 0; view < 12; ++view)
+    counts.push_back(
+        detector.counts(images.line_integrals[static_cast<std::size_t>(10 * view)], view));
+  return counts;
+}
+
+PixelStatistics statistics_of(const std::vector<Image2d>& counts) {
+  std::vector<const Image2d*> all;
+  for (const Image2d& image : counts) all.push_back(&image);
+  return pixel_statistics(all);
+}
+
 class AirLevelAlong : public testing::TestWithParam<AxisAlong> {};
 INSTANTIATE_TEST_SUITE_P(Axes, AirLevelAlong, testing::Values(AxisAlong::Columns, AxisAlong::Rows));
 
@@ -58,9 +73,7 @@ TEST_P(AirLevelAlong, IsFoundAroundAnObjectUnderStripesAndDrift) {
   std::vector<Image2d> counts;
   for (int view = 0; view < 120; ++view)
     counts.push_back(detector.counts(images.line_integrals[static_cast<std::size_t>(view)], view));
-  std::vector<const Image2d*> all;
-  for (const Image2d& image : counts) all.push_back(&image);
-  const AirLevel level = estimated_air_level(pixel_statistics(all), GetParam());
+  const AirLevel level = estimated_air_level(statistics_of(counts), GetParam());
   double error = 0.0;
   double lit = 0.0;
   for (int view = 0; view < 120; view += 7) {
@@ -84,13 +97,8 @@ TEST(LineIntegrals, FromAFlatImageAreExact) {
       simulated_scan(scan, ScanCalibration::nominal(scan, 0), test::lopsided_balls());
   const Detector detector{true, 0.0};
   const Image2d flat = detector.counts(Image2d(scan.size_px.x(), scan.size_px.y()), 0);
-  std::vector<Image2d> counts;
-  for (int view = 0; view < 12; ++view)
-    counts.push_back(
-        detector.counts(images.line_integrals[static_cast<std::size_t>(10 * view)], view));
-  std::vector<const Image2d*> all;
-  for (const Image2d& image : counts) all.push_back(&image);
-  const AirLevel level = air_level_of_flat(flat, pixel_statistics(all));
+  const std::vector<Image2d> counts = twelve_views(detector, images);
+  const AirLevel level = air_level_of_flat(flat, statistics_of(counts));
   const Image2d found = line_integrals_of(counts[5], level, scan.axis_along, 0.5);
   for (int row = 0; row < scan.size_px.y(); ++row)
     for (int column = 0; column < scan.size_px.x(); ++column)
@@ -109,13 +117,8 @@ TEST(LineIntegrals, FromAFlatOfAnotherExposureAreThoseOfTheObject) {
   const Detector detector{true, 0.02};
   Image2d flat = detector.counts(Image2d(scan.size_px.x(), scan.size_px.y()), 0);
   for (float& value : flat.pixels) value *= 2.0F;
-  std::vector<Image2d> counts;
-  for (int view = 0; view < 12; ++view)
-    counts.push_back(
-        detector.counts(images.line_integrals[static_cast<std::size_t>(10 * view)], view));
-  std::vector<const Image2d*> all;
-  for (const Image2d& image : counts) all.push_back(&image);
-  const AirLevel level = air_level_of_flat(flat, pixel_statistics(all));
+  const std::vector<Image2d> counts = twelve_views(detector, images);
+  const AirLevel level = air_level_of_flat(flat, statistics_of(counts));
   EXPECT_NEAR(beam_of(counts[0], level), 0.5, 0.02);
   const Image2d found = line_integrals_of(counts[5], level, scan.axis_along, 0.5);
   EXPECT_NEAR(found.at(36, 30), images.line_integrals[50].at(36, 30), 0.04);
