@@ -2,6 +2,7 @@
 #include "tools/scan/scan_file.h"
 
 #include <cmath>
+#include <cstdint>
 #include <optional>
 #include <sstream>
 
@@ -96,23 +97,6 @@ void read_geometry(TomlTableReader& reader, CircularScan& scan) {
                        "must be between 0 (the distances were measured) and 0.3");
 }
 
-/// The words between blanks or line ends, each with its place; # begins a comment.
-struct PlacedWord {
-  std::string word;
-  std::string place;  ///< file:line
-};
-std::vector<PlacedWord> words_of_file(const std::filesystem::path& path) {
-  std::istringstream lines(read_text_file(path, kMostTomlBytes));
-  std::vector<PlacedWord> found;
-  std::string line;
-  for (int number = 1; std::getline(lines, line); ++number) {
-    std::istringstream words(line.substr(0, line.find('#')));
-    for (std::string word; words >> word;)
-      found.push_back({word, path.string() + ":" + std::to_string(number)});
-  }
-  return found;
-}
-
 /// The lines without the blanks around them, which are not empty; # at the beginning is a comment.
 std::vector<std::string> lines_of_file(const std::filesystem::path& path) {
   std::istringstream text(read_text_file(path, kMostTomlBytes));
@@ -126,13 +110,20 @@ std::vector<std::string> lines_of_file(const std::filesystem::path& path) {
   return found;
 }
 
+/// Numbers between blanks or line ends, as many as there are; # begins a comment.
 std::vector<double> read_angles_file(const std::filesystem::path& path) {
+  std::istringstream lines(read_text_file(path, kMostTomlBytes));
   std::vector<double> angles_deg;
-  for (const auto& [word, place] : words_of_file(path)) {
-    const std::optional<double> angle_deg = finite_number(word);
-    if (!angle_deg)
-      throw FileError(place, "'" + word + "' is not an angle: angles_file holds a number per view");
-    angles_deg.push_back(*angle_deg);
+  std::string line;
+  for (int number = 1; std::getline(lines, line); ++number) {
+    std::istringstream words(line.substr(0, line.find('#')));
+    for (std::string word; words >> word;) {
+      const std::optional<double> angle_deg = finite_number(word);
+      if (!angle_deg)
+        throw FileError(path.string() + ":" + std::to_string(number),
+                        "'" + word + "' is not an angle: angles_file holds a number per view");
+      angles_deg.push_back(*angle_deg);
+    }
   }
   return angles_deg;
 }
@@ -242,7 +233,8 @@ std::string ScanFile::file_of(int view) const {
   if (!listed_files.empty()) return listed_files.at(static_cast<std::size_t>(view));
   if (is_stack()) return files;
   const IndexPlace place = index_place(files).value();
-  std::string index = std::to_string(first_index + view * index_step);
+  // Both may be 100000 at most: their product is no int.
+  std::string index = std::to_string(first_index + std::int64_t{view} * index_step);
   if (index.size() < place.digits) index.insert(0, place.digits - index.size(), '0');
   std::string path = files;
   return path.replace(place.begin, place.length, index);

@@ -12,6 +12,7 @@
 #include "base/toml_text.h"
 #include "figures/picture.h"
 #include "files/output_file.h"
+#include "image/quantile.h"
 #include "image_files/ct_reader.h"
 #include "image_files/image_file.h"
 #include "scan/image_sampling.h"
@@ -194,12 +195,10 @@ double write_view(const ScanOptions& options,
 
 /// The response of held-out views that half of them exceed, along columns or rows.
 double median_response(const CalibratedScan& scan, int axis) {
-  std::vector<double> responses;
+  std::vector<float> responses;
   for (const JudgedView& row : scan.calibrated.views)
-    responses.push_back(row.alignment.response[axis]);
-  const auto middle = responses.begin() + static_cast<std::ptrdiff_t>(responses.size() / 2);
-  std::nth_element(responses.begin(), middle, responses.end());
-  return *middle;
+    responses.push_back(static_cast<float>(row.alignment.response[axis]));
+  return static_cast<double>(nearest_rank(std::move(responses), 0.5));
 }
 
 /// What people should know before they trust the study, a line each.

@@ -77,6 +77,9 @@ TEST(ScanFile, TakesEveryFewthFile) {
       parse_scan_file(with("first_index = 7", "first_index = 7\nindex_step = 3"), "scan.toml");
   EXPECT_EQ(file.file_of(0), "p0007.png");
   EXPECT_EQ(file.file_of(2), "p0013.png");
+  const ScanFile sparse =
+      parse_scan_file(with("first_index = 7", "first_index = 7\nindex_step = 100000"), "scan.toml");
+  EXPECT_EQ(sparse.file_of(100000), "p10000000007.png");
 }
 
 TEST(ScanFile, KeepsTheStatedDistanceUnlessToldOtherwise) {
