@@ -28,7 +28,8 @@ stop, run the same command again to continue. Needs the programs in build/releas
   --raycast-starts N        of each interval's starts, so many also by ray casting, with both steps; 0: no ray casting, and
                             no finish                                                                            [1]
   --calibration OPTIONS     options of af-scan, in one word, e.g. "--as-stated" for a calibrated scanner
-  --field OPTIONS           options of af-precompute, in one word                                 [--preset standard]
+  --field OPTIONS           options of af-precompute, in one word; the default's fields are finer, and eight times as
+                            large as those of --preset standard     [--preset standard --st-nodes 1024 --codewords 65536]
   --max-rotation-deg X      range of the fields, degrees                                                         [16]
   --max-translation-mm X    range of the fields, mm                                                              [40]
   --quick                   2 pairs, 1 start in each of 15 intervals, ray casting from 4 starts per case and preset
@@ -39,7 +40,9 @@ TEXT
 }
 
 folder="" scan="" target="$PWD/real-xrays" pairs=5 presets=robust,fast,paper starts=8 intervals=15 raycast_starts=1
-raycast_intervals=15 field_words="--preset standard" scan_words="" max_rotation_deg=16 max_translation_mm=40 ranks=$(core_count) seed=1
+raycast_intervals=15 scan_words="" max_rotation_deg=16 max_translation_mm=40 ranks=$(core_count) seed=1
+# What the X-rays are compared to must be as exact as ray casting.
+field_words="--preset standard --st-nodes 1024 --codewords 65536"
 while (($# > 0)); do
   case "$1" in
     --scan) need_value "$1" $#; scan=$2; shift ;;

@@ -210,27 +210,45 @@ std::vector<double> angle_shares_rad(const std::vector<double>& angles_rad) {
   return shares;
 }
 
-Eigen::VectorXd AngleSeries::basis(int harmonics, double angle_rad) {
-  Eigen::VectorXd values(1 + Eigen::Index{2} * harmonics);
+std::optional<double> seam_rad(const CircularScan& scan) {
+  constexpr double kTurn = 2.0 * std::numbers::pi;
+  const std::vector<double>& angles = scan.angles_rad;
+  double forward = 0.0;
+  double backward = 0.0;
+  for (std::size_t i = 1; i < angles.size(); ++i) {
+    const double step = std::remainder(angles[i] - angles[i - 1], kTurn);
+    (step < 0.0 ? backward : forward) += std::abs(step);
+  }
+  const double turned = std::max(forward, backward);
+  constexpr double kRounding = 1e-9;
+  const bool goes_once_round =
+      std::min(forward, backward) == 0.0 && turned > 0.0 && turned <= kTurn + kRounding;
+  if (!goes_once_round) return std::nullopt;
+  return angles.front() + (forward > 0.0 ? -0.5 : 0.5) * (kTurn - turned);
+}
+
+Eigen::VectorXd AngleBasis::at(double angle_rad) const {
+  Eigen::VectorXd values(size());
   values[0] = 1.0;
   for (Eigen::Index k = 1; k <= harmonics; ++k) {
     const double angle = static_cast<double>(k) * angle_rad;
     values[2 * k - 1] = std::cos(angle);
     values[2 * k] = std::sin(angle);
   }
+  if (seam_rad) {
+    const double turns = (angle_rad - *seam_rad) / (2.0 * std::numbers::pi);
+    values[size() - 1] = turns - std::floor(turns) - 0.5;
+  }
   return values;
-}
-
-double AngleSeries::at(double angle_rad) const {
-  return basis(harmonics(), angle_rad).dot(coefficients);
 }
 
 ScanCalibration ScanCalibration::nominal(const CircularScan& scan, int harmonics) {
   ScanCalibration calibration;
   calibration.source_to_detector_mm = scan.source_to_detector_mm;
-  calibration.column_px = AngleSeries(harmonics);
-  calibration.row_px = AngleSeries(harmonics);
-  calibration.rotation_rad = AngleSeries(harmonics);
+  const AngleBasis basis = {harmonics, seam_rad(scan)};
+  calibration.column_px = AngleSeries(basis);
+  calibration.row_px = AngleSeries(basis);
+  calibration.rotation_rad = AngleSeries(basis);
   calibration.column_px.coefficients[0] = scan.stated_foot_px().x();
   calibration.row_px.coefficients[0] = scan.stated_foot_px().y();
   return calibration;

@@ -69,16 +69,30 @@ std::vector<std::string> problems(const CircularScan& scan);
 /// The shares sum to 2 pi; angles may repeat and exceed a turn.
 std::vector<double> angle_shares_rad(const std::vector<double>& angles_rad);
 
-/// A value that changes with the view angle a: c0 + sum over k of c(2k-1) cos(ka) + c(2k) sin(ka).
+/// The angle, rad, half way between the last view and the first of a scan whose views follow each
+/// other once round, in either direction: what drifts in time jumps there. None for other scans.
+std::optional<double> seam_rad(const CircularScan& scan);
+
+/// Functions of the view angle a that describe a geometry: 1, cos a, sin a, cos 2a, ..., and, where
+/// the scan has a seam, a drift that grows by 1 from the seam once round to it.
+struct AngleBasis {
+  int harmonics = 0;
+  std::optional<double> seam_rad;
+
+  [[nodiscard]] Eigen::Index size() const { return 1 + 2 * harmonics + (seam_rad ? 1 : 0); }
+  /// The values of the functions, in this order.
+  [[nodiscard]] Eigen::VectorXd at(double angle_rad) const;
+};
+
+/// A value that changes with the view angle: the product of the basis with the coefficients.
 struct AngleSeries {
+  AngleBasis basis;
   Eigen::VectorXd coefficients = Eigen::VectorXd::Zero(1);
 
-  explicit AngleSeries(int harmonics = 0)
-      : coefficients(Eigen::VectorXd::Zero(1 + 2 * harmonics)) {}
-  [[nodiscard]] double at(double angle_rad) const;
-  [[nodiscard]] int harmonics() const { return static_cast<int>(coefficients.size() - 1) / 2; }
-  /// (1, cos a, sin a, cos 2a, ...): at() is its product with the coefficients.
-  static Eigen::VectorXd basis(int harmonics, double angle_rad);
+  AngleSeries() = default;
+  explicit AngleSeries(const AngleBasis& of)
+      : basis(of), coefficients(Eigen::VectorXd::Zero(of.size())) {}
+  [[nodiscard]] double at(double angle_rad) const { return basis.at(angle_rad).dot(coefficients); }
 };
 
 /// What a scan's geometry really is. The distance from source to axis stays the stated one: it is
@@ -90,7 +104,7 @@ struct ScanCalibration {
   AngleSeries row_px;        ///< likewise
   AngleSeries rotation_rad;  ///< of the detector in its plane, from its column towards its row axis
 
-  /// The stated geometry: an ideal circle.
+  /// The stated geometry: an ideal circle, and room for harmonics and drift.
   static ScanCalibration nominal(const CircularScan& scan, int harmonics);
   /// The same geometry for the scan's binned() pixels, and back by a factor of 1 / factor.
   [[nodiscard]] ScanCalibration binned(double factor) const;

@@ -82,7 +82,8 @@ class Rounds {
     double step_px = 0.0;  ///< root mean square over views, of column and row
   };
   Outcome improve(ScanCalibration& calibration) const {
-    const Eigen::Index size = 1 + Eigen::Index{2} * options_.harmonics;
+    const AngleBasis functions = calibration.column_px.basis;
+    const Eigen::Index size = functions.size();
     const Eigen::Index all = kViewParameters * size;
     Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(all, all);
     Eigen::VectorXd right = Eigen::VectorXd::Zero(all);
@@ -98,7 +99,7 @@ class Rounds {
           held_out_residual(images_, calibration, from, judged, options_, pool_);
       for (const JudgedView& judged_view : residual.views) {
         const double angle = images_.scan.angles_rad[static_cast<std::size_t>(judged_view.view)];
-        const Eigen::VectorXd basis = AngleSeries::basis(options_.harmonics, angle);
+        const Eigen::VectorXd basis = functions.at(angle);
         bases.push_back(basis);
         const ViewAlignment& alignment = judged_view.alignment;
         for (int p = 0; p < kViewParameters; ++p) {
@@ -230,7 +231,7 @@ void SelfCalibrationOptions::describe(Fields& field) {
   field("harmonics",
         harmonics,
         "Harmonics of the view angle in which the beam's foot and the detector's rotation may "
-        "change")
+        "change, besides a drift from the first view to the last; at most one per 16 views")
       .within(0, 12);
   field("rounds", rounds, "Rounds of reconstructing, predicting and moving cameras").within(1, 100);
   field("fine_px", fine_px, "Smoothing of compared images, pixels of the working resolution")
@@ -279,7 +280,11 @@ ScanCalibration stated_calibration(const ScanImages& images,
                                    const std::vector<int>& used,
                                    const SelfCalibrationOptions& options,
                                    ThreadPool& pool) {
-  const ScanCalibration stated = ScanCalibration::nominal(images.scan, options.harmonics);
+  // The shortest period must show in views enough.
+  constexpr std::size_t kViewsPerPeriod = 8;
+  const auto most_harmonics = static_cast<int>(used.size() / kViewsPerPeriod);
+  const ScanCalibration stated =
+      ScanCalibration::nominal(images.scan, std::min(options.harmonics, most_harmonics));
   ScanCalibration centred = stated;
   (images.scan.axis_along == AxisAlong::Columns ? centred.row_px : centred.column_px)
       .coefficients[0] = axis_position_px(images, used);

@@ -15,7 +15,8 @@
 namespace af {
 
 struct SelfCalibrationOptions {
-  int harmonics = 3;     ///< of the view angle, in column, row and rotation
+  /// Of the view angle, in column, row and rotation; at most one per 8 of the used views.
+  int harmonics = 8;
   int rounds = 6;        ///< at the finer of two resolutions
   double fine_px = 1.0;  ///< of the band pass, pixels of the working resolution
   double coarse_px = 6.0;

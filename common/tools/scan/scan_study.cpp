@@ -227,7 +227,9 @@ std::string calibration_text(const CalibratedScan& scan, double most_masked) {
   std::string text =
       "# Found from the even views of the scan, judged by the odd ones against the even ones' "
       "reconstruction. Pixels are those of the X-rays here.\n# Series: constant, cos a, sin a, cos "
-      "2a, sin 2a, ... of the view angle a.\n";
+      "2a, sin 2a, ... of the view angle a";
+  if (found.column_px.basis.seam_rad) text += "; the last is a drift from first to last view";
+  text += ".\n";
   text += "scan = " + toml_text(scan.name) + "\n";
   text +=
       "enlarged = " + std::to_string(scan.enlarged) + "  # lengths over those of the scan's file\n";

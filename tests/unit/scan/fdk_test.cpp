@@ -28,9 +28,9 @@ TEST_P(FdkAlong, OfABallGivesItsAttenuationWhereItIs) {
   const CircularScan scan = small_scan(GetParam());
   // A detector off its place, turned and tilted, as the camera says.
   ScanCalibration truth = ScanCalibration::nominal(scan, 1);
-  truth.column_px.coefficients << 32.0, 1.0, -2.0;
-  truth.row_px.coefficients << 31.0, -1.0, 0.5;
-  truth.rotation_rad.coefficients << 0.05, 0.01, 0.0;
+  truth.column_px.coefficients << 32.0, 1.0, -2.0, 0.5;
+  truth.row_px.coefficients << 31.0, -1.0, 0.5, -0.5;
+  truth.rotation_rad.coefficients << 0.05, 0.01, 0.0, 0.0;
   truth.tilt_rad = 0.02;
   const Eigen::Vector3d center(4.0, -3.0, 5.0);
   const ScanImages images = simulated_scan(scan, truth, {Ball{center, 8.0, 0.02}});

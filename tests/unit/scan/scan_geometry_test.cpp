@@ -140,7 +140,7 @@ TEST(ScanCamera, TurnsAboutTheAxisAgainstTheObject) {
 TEST(ScanCalibration, BinsAndUnbins) {
   const CircularScan scan = small_scan();
   ScanCalibration calibration = ScanCalibration::nominal(scan, 2);
-  calibration.column_px.coefficients << 30.0, 1.0, -2.0, 0.5, 0.25;
+  calibration.column_px.coefficients << 30.0, 1.0, -2.0, 0.5, 0.25, 0.75;
   const Eigen::Vector3d point(3.0, 2.0, 8.0);
   const Eigen::Vector2d fine = scan_camera(scan, calibration, 0.4).project(point);
   const Eigen::Vector2d coarse =
@@ -151,6 +151,37 @@ TEST(ScanCalibration, BinsAndUnbins) {
              calibration.column_px.coefficients)
                 .norm(),
             kRounding);
+}
+
+TEST(Seam, LiesBetweenTheLastViewAndTheFirstOfOneTurnInOrder) {
+  CircularScan scan = small_scan();  // from 10 degrees on, 120 views
+  ASSERT_TRUE(seam_rad(scan));
+  EXPECT_NEAR(*seam_rad(scan), 8.5 * kRadPerDeg, kRounding);
+  // Angles as a scanner may list them, past 360 degrees or back.
+  std::vector<double>& angles = scan.angles_rad;
+  const std::vector<double> in_order = angles;
+  for (double& angle : angles) angle = std::remainder(angle, 2.0 * std::numbers::pi);
+  EXPECT_NEAR(seam_rad(scan).value(), 8.5 * kRadPerDeg, kRounding);
+  angles.assign(in_order.rbegin(), in_order.rend());
+  EXPECT_NEAR(seam_rad(scan).value(), (367.0 + 1.5) * kRadPerDeg, kRounding);
+  // In two turns, or in any order, time is not the angle.
+  angles = in_order;
+  angles.insert(angles.end(), in_order.begin(), in_order.end());
+  EXPECT_FALSE(seam_rad(scan));
+  angles = in_order;
+  std::swap(angles[10], angles[20]);
+  EXPECT_FALSE(seam_rad(scan));
+}
+
+TEST(AngleBasis, DriftsByOneFromSeamToSeam) {
+  const AngleBasis basis = {1, 0.5};
+  ASSERT_EQ(basis.size(), 4);
+  const auto drift = [&](double angle_rad) { return basis.at(angle_rad)[3]; };
+  EXPECT_NEAR(drift(0.5 + 1e-9), -0.5, 1e-8);
+  EXPECT_NEAR(drift(0.5 + std::numbers::pi), 0.0, kRounding);
+  EXPECT_NEAR(drift(0.5 - 1e-9), 0.5, 1e-8);
+  EXPECT_NEAR(drift(0.7 - 4.0 * std::numbers::pi), drift(0.7), kRounding);
+  EXPECT_EQ((AngleBasis{1, std::nullopt}.size()), 3);
 }
 
 TEST(AngleShares, AreHalfTheGapsAndFillTheCircle) {

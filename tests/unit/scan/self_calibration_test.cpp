@@ -25,18 +25,18 @@ SelfCalibrationOptions quick_options() {
   options.working_px = 72;
   options.search_px = 36;
   options.coarse_px = 4.0;
-  options.focal_share = 0.05;
+  options.focal_share = 0.02;
   options.tilt_deg = 0.0;
   return options;
 }
 
-/// A detector off its place whose foot and rotation wobble, and farther than stated.
+/// A detector off its place whose foot and rotation wobble and drift, and farther than stated.
 ScanCalibration wobbling(const CircularScan& scan) {
   ScanCalibration truth = ScanCalibration::nominal(scan, 2);
   truth.source_to_detector_mm *= 1.02;
-  truth.column_px.coefficients << 38.0, 0.3, -0.2, 0.4, 0.3;
-  truth.row_px.coefficients << 29.0, -0.3, 0.4, 0.3, -0.4;
-  truth.rotation_rad.coefficients << 0.015, 0.002, -0.001, 0.003, 0.002;
+  truth.column_px.coefficients << 38.0, 0.3, -0.2, 0.4, 0.3, 0.5;
+  truth.row_px.coefficients << 29.0, -0.3, 0.4, 0.3, -0.4, -0.4;
+  truth.rotation_rad.coefficients << 0.015, 0.002, -0.001, 0.003, 0.002, 0.001;
   return truth;
 }
 
