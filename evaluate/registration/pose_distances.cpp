@@ -113,15 +113,22 @@ std::vector<MethodEnds> ends_of(const EvaluationRun& run) {
   return all;
 }
 
+struct Distances {
+  std::vector<double> mm, deg;
+};
+
 /// Of starts that both have.
-std::vector<double> distances_mm(const MethodEnds& a, const MethodEnds& b) {
-  std::vector<double> distances;
+Distances distances_of(const MethodEnds& a, const MethodEnds& b) {
+  Distances distances;
   for (const auto& [index, end] : a.ends) {
     const auto other = b.ends.find(index);
     if (other == b.ends.end()) continue;
     const EndPose& its = other->second;
-    if (mean_tre_mm(end.start_room_from_ct, its.start_room_from_ct, a.points_ct_mm) < kSameStartMm)
-      distances.push_back(mean_tre_mm(end.room_from_ct, its.room_from_ct, a.points_ct_mm));
+    if (mean_tre_mm(end.start_room_from_ct, its.start_room_from_ct, a.points_ct_mm) >= kSameStartMm)
+      continue;
+    distances.mm.push_back(mean_tre_mm(end.room_from_ct, its.room_from_ct, a.points_ct_mm));
+    distances.deg.push_back(kDegPerRad *
+                            rotation_angle_between_rad(end.room_from_ct, its.room_from_ct));
   }
   return distances;
 }
@@ -144,9 +151,15 @@ std::vector<PoseDistanceRow> pose_distances(const std::vector<EvaluationRun>& ru
       const MethodEnds& a = methods[i];
       const MethodEnds& b = methods[k];
       if (a.case_name != b.case_name) continue;
-      const std::vector<double> distances = distances_mm(a, b);
-      if (!distances.empty())
-        rows.push_back({a.case_name, a.run, a.renderer, b.run, b.renderer, summarize(distances)});
+      const Distances distances = distances_of(a, b);
+      if (!distances.mm.empty())
+        rows.push_back({a.case_name,
+                        a.run,
+                        a.renderer,
+                        b.run,
+                        b.renderer,
+                        summarize(distances.mm),
+                        summarize(distances.deg)});
     }
   return rows;
 }
@@ -161,7 +174,10 @@ CsvTable pose_distances_table(const std::vector<PoseDistanceRow>& rows) {
                   "mean_distance_mm",
                   "median_distance_mm",
                   "p95_distance_mm",
-                  "max_distance_mm"});
+                  "max_distance_mm",
+                  "median_rotation_deg",
+                  "p95_rotation_deg",
+                  "max_rotation_deg"});
   for (const PoseDistanceRow& row : rows)
     table.add_row({row.case_name,
                    row.run_a,
@@ -172,21 +188,31 @@ CsvTable pose_distances_table(const std::vector<PoseDistanceRow>& rows) {
                    number_text(row.distance_mm.mean),
                    number_text(row.distance_mm.median),
                    number_text(row.distance_mm.percentile_95),
-                   number_text(row.distance_mm.maximum)});
+                   number_text(row.distance_mm.maximum),
+                   number_text(row.rotation_deg.median),
+                   number_text(row.rotation_deg.percentile_95),
+                   number_text(row.rotation_deg.maximum)});
   return table;
 }
+
+namespace {
+
+std::string percentiles_text(const SampleSummary& summary) {
+  return fixed_text(summary.median, 4) + ", " + fixed_text(summary.percentile_95, 4) + ", " +
+         fixed_text(summary.maximum, 4);
+}
+
+}  // namespace
 
 std::string pose_distances_markdown(const std::vector<PoseDistanceRow>& rows) {
   if (rows.empty()) return "";
   std::string text =
       "| Case | End poses of | and of | Starts | Distance, mm: median, 95th percentile, maximum "
-      "|\n|---|---|---|---|---|\n";
+      "| Rotation, deg: the same |\n|---|---|---|---|---|---|\n";
   for (const PoseDistanceRow& row : rows)
     text += "| " + row.case_name + " | " + row.run_a + " " + row.renderer_a + " | " + row.run_b +
             " " + row.renderer_b + " | " + std::to_string(row.distance_mm.count) + " | " +
-            fixed_text(row.distance_mm.median, 4) + ", " +
-            fixed_text(row.distance_mm.percentile_95, 4) + ", " +
-            fixed_text(row.distance_mm.maximum, 4) + " |\n";
+            percentiles_text(row.distance_mm) + " | " + percentiles_text(row.rotation_deg) + " |\n";
   return text;
 }
 

@@ -19,7 +19,8 @@ struct PoseDistanceRow {
   std::string case_name;
   std::string run_a, renderer_a;  ///< a run's folder's name
   std::string run_b, renderer_b;
-  SampleSummary distance_mm;  ///< mean over the target box, of starts where both have an end pose
+  SampleSummary distance_mm;   ///< mean over the target box, of starts where both have an end pose
+  SampleSummary rotation_deg;  ///< of one end against the other (geodesic), of the same starts
 };
 
 /// Every pair of methods of the runs that began at the same starts: rows of one case with equal

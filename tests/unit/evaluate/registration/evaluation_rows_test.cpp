@@ -713,14 +713,15 @@ TEST(PoseDistances, OfTwoRunsAreThoseOfTheirEndsFromTheSameStarts) {
   EXPECT_NEAR(found[0].distance_mm.median, 0.3, kRounding);
   EXPECT_NEAR(found[0].distance_mm.maximum, 0.5, kRounding);
   EXPECT_EQ(pose_distances_table(found).text(0, "starts"), "2");
-  EXPECT_THAT(pose_distances_markdown(found), testing::HasSubstr("| 2 | 0.3000, "));
+  EXPECT_THAT(pose_distances_markdown(found),
+              testing::HasSubstr("| 2 | 0.3000, 0.4800, 0.5000 | 0.0000, 0.0000, 0.0000 |"));
 }
 
 /// Field against `renderer_b`, on one case.
 PoseDistanceRow distances_of(const std::string& case_name,
                              const std::vector<double>& distances_mm,
                              const std::string& renderer_b = "raycast") {
-  return {case_name, "a", "field", "b", renderer_b, summarize(distances_mm)};
+  return {case_name, "a", "field", "b", renderer_b, summarize(distances_mm), {}};
 }
 
 TEST(PoseDistances, OverPatientsTakeTheirMeansAlike) {
@@ -785,6 +786,7 @@ TEST(PoseDistances, OfARotationDependOnWhereTheBoxIs) {
   far.summary["cases"][0]["target_box_ct_mm"] = {{100, 1, 2}, {102, 3, 4}};
   const std::vector<PoseDistanceRow> found = pose_distances({far, run_with_ends(b, second)});
   EXPECT_NEAR(found.at(0).distance_mm.median, 200 * std::sin(0.5 * kRadPerDeg), 1e-3);
+  EXPECT_NEAR(found.at(0).rotation_deg.median, 1.0, 1e-9);
 }
 
 TEST(PoseDistances, OfARunThatStatesNoTargetAreAFileError) {
