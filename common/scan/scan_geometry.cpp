@@ -210,21 +210,32 @@ std::vector<double> angle_shares_rad(const std::vector<double>& angles_rad) {
   return shares;
 }
 
-std::optional<double> seam_rad(const CircularScan& scan) {
-  constexpr double kTurn = 2.0 * std::numbers::pi;
-  const std::vector<double>& angles = scan.angles_rad;
+std::optional<std::vector<double>> continued_rad(const std::vector<double>& angles_rad) {
+  std::vector<double> continued = angles_rad;
   double forward = 0.0;
   double backward = 0.0;
-  for (std::size_t i = 1; i < angles.size(); ++i) {
-    const double step = std::remainder(angles[i] - angles[i - 1], kTurn);
+  for (std::size_t i = 1; i < angles_rad.size(); ++i) {
+    const double step = std::remainder(angles_rad[i] - angles_rad[i - 1], kTurn);
+    constexpr double kMostStep = 0.25 * kTurn;
+    if (std::abs(step) > kMostStep) return std::nullopt;
     (step < 0.0 ? backward : forward) += std::abs(step);
+    continued[i] = continued[i - 1] + step;
   }
-  const double turned = std::max(forward, backward);
-  constexpr double kRounding = 1e-9;
-  const bool goes_once_round =
-      std::min(forward, backward) == 0.0 && turned > 0.0 && turned <= kTurn + kRounding;
-  if (!goes_once_round) return std::nullopt;
-  return angles.front() + (forward > 0.0 ? -0.5 : 0.5) * (kTurn - turned);
+  constexpr double kMostBack = 0.01;
+  if (std::min(forward, backward) > kMostBack * (forward + backward)) return std::nullopt;
+  return continued;
+}
+
+std::optional<Sweep> sweep_of(const CircularScan& scan) {
+  const std::optional<std::vector<double>> continued = continued_rad(scan.angles_rad);
+  const auto is_same = [](double a, double b) {
+    constexpr double kRounding = 1e-6;
+    return std::abs(a - b) < kRounding;
+  };
+  if (!continued || continued->empty() || is_same(continued->front(), continued->back()) ||
+      !std::equal(continued->begin(), continued->end(), scan.angles_rad.begin(), is_same))
+    return std::nullopt;
+  return Sweep{continued->front(), continued->back()};
 }
 
 Eigen::VectorXd AngleBasis::at(double angle_rad) const {
@@ -235,17 +246,15 @@ Eigen::VectorXd AngleBasis::at(double angle_rad) const {
     values[2 * k - 1] = std::cos(angle);
     values[2 * k] = std::sin(angle);
   }
-  if (seam_rad) {
-    const double turns = (angle_rad - *seam_rad) / (2.0 * std::numbers::pi);
-    values[size() - 1] = turns - std::floor(turns) - 0.5;
-  }
+  if (drift)
+    values[size() - 1] =
+        (angle_rad - drift->first_rad) / (drift->last_rad - drift->first_rad) - 0.5;
   return values;
 }
 
-ScanCalibration ScanCalibration::nominal(const CircularScan& scan, int harmonics) {
+ScanCalibration ScanCalibration::nominal(const CircularScan& scan, const AngleBasis& basis) {
   ScanCalibration calibration;
   calibration.source_to_detector_mm = scan.source_to_detector_mm;
-  const AngleBasis basis = {harmonics, seam_rad(scan)};
   calibration.column_px = AngleSeries(basis);
   calibration.row_px = AngleSeries(basis);
   calibration.rotation_rad = AngleSeries(basis);

@@ -26,7 +26,7 @@ struct CircularScan {
   /// Where the perpendicular from the source meets the detector (column, row), as stated; none: its
   /// middle.
   std::optional<Eigen::Vector2d> beam_foot_px;
-  std::vector<double> angles_rad;  ///< of the views
+  std::vector<double> angles_rad;  ///< of the views, in the order in which they were taken
   /// The stated distance from source to detector may be off by this share of it; 0: measured.
   double distance_tolerance = 0.0;
 
@@ -69,17 +69,27 @@ std::vector<std::string> problems(const CircularScan& scan);
 /// The shares sum to 2 pi; angles may repeat and exceed a turn.
 std::vector<double> angle_shares_rad(const std::vector<double>& angles_rad);
 
-/// The angle, rad, half way between the last view and the first of a scan whose views follow each
-/// other once round, in either direction: what drifts in time jumps there. None for other scans.
-std::optional<double> seam_rad(const CircularScan& scan);
+/// The angles of views that follow each other (steps of at most 90 degrees, all but a hundredth of
+/// the way in one direction), without the jumps by a turn that a list may have: 350, 355, 0 become
+/// 350, 355, 360. None when they do not follow each other.
+std::optional<std::vector<double>> continued_rad(const std::vector<double>& angles_rad);
+
+/// The angles, rad, of the first and the last of views that follow each other, as continued_rad()
+/// gives them.
+struct Sweep {
+  double first_rad = 0.0;
+  double last_rad = 0.0;
+};
+/// None where the views do not follow each other: their angles do not tell time.
+std::optional<Sweep> sweep_of(const CircularScan& scan);
 
 /// Functions of the view angle a that describe a geometry: 1, cos a, sin a, cos 2a, ..., and, where
-/// the scan has a seam, a drift that grows by 1 from the seam once round to it.
+/// the views follow each other, a drift, which grows evenly by 1 from the first view to the last.
 struct AngleBasis {
   int harmonics = 0;
-  std::optional<double> seam_rad;
+  std::optional<Sweep> drift;
 
-  [[nodiscard]] Eigen::Index size() const { return 1 + 2 * harmonics + (seam_rad ? 1 : 0); }
+  [[nodiscard]] Eigen::Index size() const { return 1 + 2 * harmonics + (drift ? 1 : 0); }
   /// The values of the functions, in this order.
   [[nodiscard]] Eigen::VectorXd at(double angle_rad) const;
 };
@@ -104,8 +114,8 @@ struct ScanCalibration {
   AngleSeries row_px;        ///< likewise
   AngleSeries rotation_rad;  ///< of the detector in its plane, from its column towards its row axis
 
-  /// The stated geometry: an ideal circle, and room for harmonics and drift.
-  static ScanCalibration nominal(const CircularScan& scan, int harmonics);
+  /// The stated geometry: an ideal circle, and room for these functions of the angle.
+  static ScanCalibration nominal(const CircularScan& scan, const AngleBasis& basis = {});
   /// The same geometry for the scan's binned() pixels, and back by a factor of 1 / factor.
   [[nodiscard]] ScanCalibration binned(double factor) const;
 };

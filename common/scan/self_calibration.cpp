@@ -227,12 +227,26 @@ void refuse_other_direction(const ScanImages& images,
 
 }  // namespace
 
+AngleBasis SelfCalibrationOptions::basis_for(const CircularScan& scan,
+                                             std::size_t used_views) const {
+  // What few views seem to tell of a short period is mostly noise.
+  constexpr std::size_t kViewsPerHarmonic = 8;
+  AngleBasis basis;
+  basis.harmonics = std::min(harmonics, static_cast<int>(used_views / kViewsPerHarmonic));
+  if (!omits_drift) basis.drift = sweep_of(scan);
+  return basis;
+}
+
 void SelfCalibrationOptions::describe(Fields& field) {
   field("harmonics",
         harmonics,
         "Harmonics of the view angle in which the beam's foot and the detector's rotation may "
-        "change, besides a drift from the first view to the last; at most one per 16 views")
+        "change; at most one per 16 views")
       .within(0, 12);
+  field("no_drift",
+        omits_drift,
+        "The foot and the rotation do not drift from the first view to the last. They may "
+        "otherwise, where the views follow each other");
   field("rounds", rounds, "Rounds of reconstructing, predicting and moving cameras").within(1, 100);
   field("fine_px", fine_px, "Smoothing of compared images, pixels of the working resolution")
       .within(0.3, 10.0);
@@ -280,11 +294,8 @@ ScanCalibration stated_calibration(const ScanImages& images,
                                    const std::vector<int>& used,
                                    const SelfCalibrationOptions& options,
                                    ThreadPool& pool) {
-  // The shortest period must show in views enough.
-  constexpr std::size_t kViewsPerPeriod = 8;
-  const auto most_harmonics = static_cast<int>(used.size() / kViewsPerPeriod);
   const ScanCalibration stated =
-      ScanCalibration::nominal(images.scan, std::min(options.harmonics, most_harmonics));
+      ScanCalibration::nominal(images.scan, options.basis_for(images.scan, used.size()));
   ScanCalibration centred = stated;
   (images.scan.axis_along == AxisAlong::Columns ? centred.row_px : centred.column_px)
       .coefficients[0] = axis_position_px(images, used);
@@ -409,6 +420,10 @@ ScanCalibration self_calibrate(const ScanImages& images,
   ScanCalibration calibration = stated;
   double cost = search.improve(calibration, kFirstRounds);
   report(calibration_line("As stated", calibration, cost));
+  const AngleBasis& functions = calibration.column_px.basis;
+  report("Foot and rotation of the detector may follow " + std::to_string(functions.harmonics) +
+         " harmonics of the angle" +
+         (functions.drift ? " and a drift from the first view to the last" : ", no drift"));
   refuse_other_direction(search.images(), used, options, pool, cost, report);
   const double focal_share = options.focal_share.value_or(images.scan.distance_tolerance);
   if (focal_share > 0.0) {
@@ -429,11 +444,14 @@ ScanCalibration self_calibrate(const ScanImages& images,
   const double bin_ratio = static_cast<double>(bin) / search_bin;
   calibration = calibration.binned(bin_ratio);
   constexpr double kSmallStepPx = 0.005;
-  // What was found must predict better than what was stated.
+  // What was found must predict better than what was stated, by more than what its many parameters
+  // follow of the noise of few views.
+  constexpr double kLeastGain = 0.01;
   ScanCalibration best = stated.binned(bin_ratio);
   ScanCalibration moved = best;
-  double lowest = finer.improve(moved).cost;
-  report(calibration_line("As stated, finer", best, lowest));
+  const double stated_cost = finer.improve(moved).cost;
+  double lowest = (1.0 - kLeastGain) * stated_cost;
+  report(calibration_line("As stated, finer", best, stated_cost));
   for (int round = 0; round < options.rounds; ++round) {
     const ScanCalibration before = calibration;
     const Rounds::Outcome outcome = finer.improve(calibration);

@@ -15,10 +15,10 @@
 namespace af {
 
 struct SelfCalibrationOptions {
-  /// Of the view angle, in column, row and rotation; at most one per 8 of the used views.
-  int harmonics = 8;
-  int rounds = 6;        ///< at the finer of two resolutions
-  double fine_px = 1.0;  ///< of the band pass, pixels of the working resolution
+  int harmonics = 8;         ///< of the view angle, in column, row and rotation
+  bool omits_drift = false;  ///< from the first view to the last
+  int rounds = 6;            ///< at the finer of two resolutions
+  double fine_px = 1.0;      ///< of the band pass, pixels of the working resolution
   double coarse_px = 6.0;
   int working_px = 200;  ///< the larger side of the images that rounds work on, at most
   int search_px = 120;   ///< likewise for the search of what projections hardly tell
@@ -27,6 +27,10 @@ struct SelfCalibrationOptions {
   double tilt_deg = 1.0;  ///< and the tilt within this
 
   void describe(Fields& field);
+
+  /// What may change with the angle: at most a harmonic per 8 of the used views, and a drift where
+  /// the views follow each other.
+  [[nodiscard]] AngleBasis basis_for(const CircularScan& scan, std::size_t used_views) const;
 };
 
 /// The images of a scan (line integrals), all of one size, and where they are lit.

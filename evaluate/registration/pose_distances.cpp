@@ -175,6 +175,7 @@ CsvTable pose_distances_table(const std::vector<PoseDistanceRow>& rows) {
                   "median_distance_mm",
                   "p95_distance_mm",
                   "max_distance_mm",
+                  "mean_rotation_deg",
                   "median_rotation_deg",
                   "p95_rotation_deg",
                   "max_rotation_deg"});
@@ -189,6 +190,7 @@ CsvTable pose_distances_table(const std::vector<PoseDistanceRow>& rows) {
                    number_text(row.distance_mm.median),
                    number_text(row.distance_mm.percentile_95),
                    number_text(row.distance_mm.maximum),
+                   number_text(row.rotation_deg.mean),
                    number_text(row.rotation_deg.median),
                    number_text(row.rotation_deg.percentile_95),
                    number_text(row.rotation_deg.maximum)});

@@ -42,7 +42,7 @@ dark_level = 500
 
 /// A detector off its place with a wobble.
 ScanCalibration true_geometry(const CircularScan& scan) {
-  ScanCalibration truth = ScanCalibration::nominal(scan, 2);
+  ScanCalibration truth = ScanCalibration::nominal(scan, {2, sweep_of(scan)});
   truth.column_px.coefficients << 36.5, 0.0, 0.0, 0.4, -0.3, 0.0;
   truth.row_px.coefficients << 29.5, 0.0, 0.0, -0.3, 0.2, 0.0;
   truth.rotation_rad.coefficients << 0.01, 0.0, 0.0, 0.002, 0.001, 0.0;

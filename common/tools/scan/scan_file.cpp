@@ -146,6 +146,7 @@ void read_angles(TomlTableReader& reader, const std::filesystem::path& folder, C
   if (reader.has("angles_deg") || reader.has("angles_file")) {
     for (const double angle_deg : read_listed_angles(reader, folder))
       scan.angles_rad.push_back(angle_deg * kRadPerDeg);
+    if (const auto continued = continued_rad(scan.angles_rad)) scan.angles_rad = *continued;
     return;
   }
   const auto count = get_index(reader, "view_count", 1, Presence::Required);

@@ -30,7 +30,7 @@ CalibratedScan calibrated_scan(const ScanOptions& options,
   CalibratedScan scan;
   scan.name = name;
   scan.enlarged = enlarged;
-  scan.calibration = options.is_as_stated ? ScanCalibration::nominal(images.scan, 0)
+  scan.calibration = options.is_as_stated ? ScanCalibration::nominal(images.scan)
                                           : self_calibrate(images, even, how, pool, report);
   report("Judging by the odd views");
   scan.calibrated = held_out_residual(images, scan.calibration, even, odd, how, pool);

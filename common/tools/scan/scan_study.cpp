@@ -228,7 +228,8 @@ std::string calibration_text(const CalibratedScan& scan, double most_masked) {
       "# Found from the even views of the scan, judged by the odd ones against the even ones' "
       "reconstruction. Pixels are those of the X-rays here.\n# Series: constant, cos a, sin a, cos "
       "2a, sin 2a, ... of the view angle a";
-  if (found.column_px.basis.seam_rad) text += "; the last is a drift from first to last view";
+  if (found.column_px.basis.drift)
+    text += "; the last is what the value grows by, evenly, from the first view to the last";
   text += ".\n";
   text += "scan = " + toml_text(scan.name) + "\n";
   text +=

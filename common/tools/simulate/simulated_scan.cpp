@@ -87,7 +87,7 @@ void write_circle(const SimulateOptions& options,
                   const CircularScan& scan,
                   const fs::path& folder,
                   const ProgressCallback& progress) {
-  const ScanCalibration exact = ScanCalibration::nominal(scan, 0);
+  const ScanCalibration exact = ScanCalibration::nominal(scan);
   const int bits = options.xray_in_force().detector.bits;
   const auto write = bits == 0 ? write_image : write_image_u16;
   for (int view = 0; view < options.cone_beam.views; ++view) {
@@ -211,7 +211,7 @@ CameraGeometry elevated_camera(const CircularScan& scan,
                                double angle_rad,
                                double elevation_deg,
                                const std::string& name) {
-  CameraGeometry camera = scan_camera(scan, ScanCalibration::nominal(scan, 0), angle_rad, name);
+  CameraGeometry camera = scan_camera(scan, ScanCalibration::nominal(scan), angle_rad, name);
   // The tangent of the circle at angle 0 is +x: a positive turn about it lowers the source.
   const Eigen::Vector3d tangent(std::cos(angle_rad), std::sin(angle_rad), 0.0);
   const Eigen::Matrix3d lift =

@@ -27,7 +27,7 @@ INSTANTIATE_TEST_SUITE_P(Axes, FdkAlong, testing::Values(AxisAlong::Columns, Axi
 TEST_P(FdkAlong, OfABallGivesItsAttenuationWhereItIs) {
   const CircularScan scan = small_scan(GetParam());
   // A detector off its place, turned and tilted, as the camera says.
-  ScanCalibration truth = ScanCalibration::nominal(scan, 1);
+  ScanCalibration truth = ScanCalibration::nominal(scan, {1, sweep_of(scan)});
   truth.column_px.coefficients << 32.0, 1.0, -2.0, 0.5;
   truth.row_px.coefficients << 31.0, -1.0, 0.5, -0.5;
   truth.rotation_rad.coefficients << 0.05, 0.01, 0.0, 0.0;
@@ -54,7 +54,7 @@ TEST_P(FdkAlong, ReachesAsFarAsTheDetectorSeesFromAFootAwayFromItsMiddle) {
   // 30 px towards low heights, 10 across: 18 and 6 mm at the axis.
   scan.beam_foot_px = along_columns ? Eigen::Vector2d(scan.stated_foot_px().x() + 20.0, 25.5)
                                     : Eigen::Vector2d(25.5, scan.stated_foot_px().y() - 20.0);
-  const ScanCalibration truth = ScanCalibration::nominal(scan, 0);
+  const ScanCalibration truth = ScanCalibration::nominal(scan);
   const Eigen::Vector3d center(3.0, -2.0, -20.0);
   const ScanImages images = simulated_scan(scan, truth, {Ball{center, 5.0, 0.02}});
   ThreadPool pool(2);
@@ -70,7 +70,7 @@ TEST_P(FdkAlong, ADisplacedDetectorSeesTwiceAsFar) {
     Eigen::Vector2d foot = scan.stated_foot_px();
     foot[GetParam() == AxisAlong::Columns ? 1 : 0] += displaced_px;
     scan.beam_foot_px = foot;
-    const ScanCalibration truth = ScanCalibration::nominal(scan, 0);
+    const ScanCalibration truth = ScanCalibration::nominal(scan);
     // The wide side reaches 26 mm or more at the axis, the narrow one 12 mm or less.
     const Eigen::Vector3d center(15.0, -6.0, 3.0);
     const ScanImages images =
@@ -88,7 +88,7 @@ TEST_P(FdkAlong, ADisplacedDetectorSeesTwiceAsFar) {
 TEST_P(FdkAlong, AnObjectBeyondTheDetectorHasNoBrightRim) {
   CircularScan scan = small_scan(GetParam());
   scan.size_px[GetParam() == AxisAlong::Columns ? 1 : 0] = 30;
-  const ScanCalibration truth = ScanCalibration::nominal(scan, 0);
+  const ScanCalibration truth = ScanCalibration::nominal(scan);
   const ScanImages images = simulated_scan(scan, truth, {Ball{{0.0, 0.0, 0.0}, 14.0, 0.02}});
   ThreadPool pool(2);
   const MuVolume volume =
@@ -100,7 +100,7 @@ TEST_P(FdkAlong, AnObjectBeyondTheDetectorHasNoBrightRim) {
 
 TEST(Fdk, TakesUnevenAnglesByTheirShares) {
   const CircularScan scan = small_scan();
-  const ScanCalibration truth = ScanCalibration::nominal(scan, 0);
+  const ScanCalibration truth = ScanCalibration::nominal(scan);
   const ScanImages images = simulated_scan(scan, truth, {Ball{{0.0, 0.0, 0.0}, 10.0, 0.02}});
   ThreadPool pool(2);
   std::vector<int> views = CircularScan::every(0, 1, 60);
@@ -112,7 +112,7 @@ TEST(Fdk, TakesUnevenAnglesByTheirShares) {
 
 TEST(Fdk, DoesNotDependOnThreads) {
   const CircularScan scan = small_scan();
-  const ScanCalibration truth = ScanCalibration::nominal(scan, 0);
+  const ScanCalibration truth = ScanCalibration::nominal(scan);
   const ScanImages images = simulated_scan(scan, truth, test::lopsided_balls());
   ThreadPool one(1);
   ThreadPool three(3);

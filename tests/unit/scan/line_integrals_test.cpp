@@ -68,7 +68,7 @@ TEST_P(AirLevelAlong, IsFoundAroundAnObjectUnderStripesAndDrift) {
   const CircularScan scan = small_scan(GetParam());
   // A ball that covers three quarters of the width in all views, with others in it.
   const ScanImages images =
-      simulated_scan(scan, ScanCalibration::nominal(scan, 0), test::lopsided_balls());
+      simulated_scan(scan, ScanCalibration::nominal(scan), test::lopsided_balls());
   const Detector detector{GetParam() == AxisAlong::Columns, 0.05};
   std::vector<Image2d> counts;
   for (int view = 0; view < 120; ++view)
@@ -94,7 +94,7 @@ TEST_P(AirLevelAlong, IsFoundAroundAnObjectUnderStripesAndDrift) {
 TEST(LineIntegrals, FromAFlatImageAreExact) {
   const CircularScan scan = small_scan();
   const ScanImages images =
-      simulated_scan(scan, ScanCalibration::nominal(scan, 0), test::lopsided_balls());
+      simulated_scan(scan, ScanCalibration::nominal(scan), test::lopsided_balls());
   const Detector detector{true, 0.0};
   const Image2d flat = detector.counts(Image2d(scan.size_px.x(), scan.size_px.y()), 0);
   const std::vector<Image2d> counts = twelve_views(detector, images);
@@ -113,7 +113,7 @@ TEST(LineIntegrals, FromAFlatOfAnotherExposureAreThoseOfTheObject) {
   // Beside a ball half as wide as the detector there is air. It lies on the axis: no pixel changes
   // from view to view but by noise and the tube's drift.
   const ScanImages images = simulated_scan(
-      scan, ScanCalibration::nominal(scan, 0), {test::Ball{{0.0, 0.0, 0.0}, 8.0, 0.03}});
+      scan, ScanCalibration::nominal(scan), {test::Ball{{0.0, 0.0, 0.0}, 8.0, 0.03}});
   const Detector detector{true, 0.02};
   Image2d flat = detector.counts(Image2d(scan.size_px.x(), scan.size_px.y()), 0);
   for (float& value : flat.pixels) value *= 2.0F;

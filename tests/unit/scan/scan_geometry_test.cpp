@@ -27,7 +27,7 @@ INSTANTIATE_TEST_SUITE_P(Axes, ScanCameraOf, testing::Values(AxisAlong::Columns,
 
 TEST_P(ScanCameraOf, SeesTheAxisAndIsNotMirrored) {
   const CircularScan scan = small_scan(GetParam());
-  const ScanCalibration calibration = ScanCalibration::nominal(scan, 1);
+  const ScanCalibration calibration = ScanCalibration::nominal(scan, {1, sweep_of(scan)});
   for (const double angle : scan.angles_rad) {
     const CameraGeometry camera = scan_camera(scan, calibration, angle);
     EXPECT_THAT(problems(camera), IsEmpty());
@@ -48,7 +48,7 @@ TEST_P(ScanCameraOf, StandsWhereTheStatedFootIs) {
   CircularScan scan = small_scan(GetParam());
   scan.beam_foot_px = Eigen::Vector2d(20.0, 25.0);
   const CameraGeometry camera =
-      scan_camera(scan, ScanCalibration::nominal(scan, 1), scan.angles_rad[7]);
+      scan_camera(scan, ScanCalibration::nominal(scan, {1, sweep_of(scan)}), scan.angles_rad[7]);
   EXPECT_LT((camera.project(Eigen::Vector3d::Zero()) - *scan.beam_foot_px).norm(), kRounding);
   // The same camera in pixels of twice the size: outer edges stay, so centres are halved about
   // -1/2.
@@ -87,7 +87,7 @@ TEST(RoomForRegistration, EnlargesASmallScanAndChangesNoProjection) {
   EXPECT_EQ(room_for_registration(small.enlarged(factor)), 1);
   const Eigen::Vector3d point(10.0, -7.0, 5.0);
   const auto pixel_of = [&](const CircularScan& taken, double size) -> Eigen::Vector2d {
-    return scan_camera(taken, ScanCalibration::nominal(taken, 0), 0.7).project(size * point);
+    return scan_camera(taken, ScanCalibration::nominal(taken), 0.7).project(size * point);
   };
   EXPECT_LT((pixel_of(small, 0.1) - pixel_of(scan, 1.0)).norm(), kRounding);
 }
@@ -109,7 +109,7 @@ TEST(ViewAtAxis, ReachesFromTheFootToTheEdges) {
 
 TEST_P(ScanCameraOf, MovesImagesAsItsParametersSay) {
   const CircularScan scan = small_scan(GetParam());
-  ScanCalibration calibration = ScanCalibration::nominal(scan, 0);
+  ScanCalibration calibration = ScanCalibration::nominal(scan);
   const Eigen::Vector3d point(3.0, 2.0, 8.0);
   const Eigen::Vector2d before = scan_camera(scan, calibration, 0.4).project(point);
   calibration.column_px.coefficients[0] += 2.0;
@@ -128,7 +128,7 @@ TEST_P(ScanCameraOf, MovesImagesAsItsParametersSay) {
 TEST(ScanCamera, TurnsAboutTheAxisAgainstTheObject) {
   // A camera turned by a sees the object as the first camera sees it turned by -a.
   const CircularScan scan = small_scan();
-  const ScanCalibration calibration = ScanCalibration::nominal(scan, 0);
+  const ScanCalibration calibration = ScanCalibration::nominal(scan);
   const Eigen::Vector3d point(5.0, -3.0, 4.0);
   const Eigen::Matrix3d back = rotation_from_angles({0.0, 0.0, -0.7});
   EXPECT_LT((scan_camera(scan, calibration, 0.7).project(point) -
@@ -139,7 +139,7 @@ TEST(ScanCamera, TurnsAboutTheAxisAgainstTheObject) {
 
 TEST(ScanCalibration, BinsAndUnbins) {
   const CircularScan scan = small_scan();
-  ScanCalibration calibration = ScanCalibration::nominal(scan, 2);
+  ScanCalibration calibration = ScanCalibration::nominal(scan, {2, sweep_of(scan)});
   calibration.column_px.coefficients << 30.0, 1.0, -2.0, 0.5, 0.25, 0.75;
   const Eigen::Vector3d point(3.0, 2.0, 8.0);
   const Eigen::Vector2d fine = scan_camera(scan, calibration, 0.4).project(point);
@@ -153,35 +153,47 @@ TEST(ScanCalibration, BinsAndUnbins) {
             kRounding);
 }
 
-TEST(Seam, LiesBetweenTheLastViewAndTheFirstOfOneTurnInOrder) {
-  CircularScan scan = small_scan();  // from 10 degrees on, 120 views
-  ASSERT_TRUE(seam_rad(scan));
-  EXPECT_NEAR(*seam_rad(scan), 8.5 * kRadPerDeg, kRounding);
-  // Angles as a scanner may list them, past 360 degrees or back.
-  std::vector<double>& angles = scan.angles_rad;
-  const std::vector<double> in_order = angles;
-  for (double& angle : angles) angle = std::remainder(angle, 2.0 * std::numbers::pi);
-  EXPECT_NEAR(seam_rad(scan).value(), 8.5 * kRadPerDeg, kRounding);
-  angles.assign(in_order.rbegin(), in_order.rend());
-  EXPECT_NEAR(seam_rad(scan).value(), (367.0 + 1.5) * kRadPerDeg, kRounding);
-  // In two turns, or in any order, time is not the angle.
-  angles = in_order;
-  angles.insert(angles.end(), in_order.begin(), in_order.end());
-  EXPECT_FALSE(seam_rad(scan));
-  angles = in_order;
-  std::swap(angles[10], angles[20]);
-  EXPECT_FALSE(seam_rad(scan));
+std::vector<double> in_rad(std::vector<double> angles_deg) {
+  for (double& angle : angles_deg) angle *= kRadPerDeg;
+  return angles_deg;
 }
 
-TEST(AngleBasis, DriftsByOneFromSeamToSeam) {
-  const AngleBasis basis = {1, 0.5};
-  ASSERT_EQ(basis.size(), 4);
-  const auto drift = [&](double angle_rad) { return basis.at(angle_rad)[3]; };
-  EXPECT_NEAR(drift(0.5 + 1e-9), -0.5, 1e-8);
-  EXPECT_NEAR(drift(0.5 + std::numbers::pi), 0.0, kRounding);
-  EXPECT_NEAR(drift(0.5 - 1e-9), 0.5, 1e-8);
-  EXPECT_NEAR(drift(0.7 - 4.0 * std::numbers::pi), drift(0.7), kRounding);
-  EXPECT_EQ((AngleBasis{1, std::nullopt}.size()), 3);
+TEST(ContinuedAngles, LeaveOutTheJumpsOfAList) {
+  const auto is_continued_as = [](const std::vector<double>& listed_deg,
+                                  const std::vector<double>& expected_deg) {
+    const auto found = continued_rad(in_rad(listed_deg));
+    ASSERT_TRUE(found);
+    EXPECT_THAT(*found, testing::Pointwise(testing::DoubleNear(kRounding), in_rad(expected_deg)));
+  };
+  is_continued_as({350, 355, 0, 5}, {350, 355, 360, 365});
+  is_continued_as({-170, -175, 180, 175}, {-170, -175, -180, -185});
+  // More than a turn, and a view at the first one's angle.
+  is_continued_as({0, 90, 180, 270, 0, 90}, {0, 90, 180, 270, 360, 450});
+  std::vector<double> with_jitter;
+  for (int i = 0; i < 360; ++i) with_jitter.push_back(i == 200 ? 198.9 : i);
+  is_continued_as(with_jitter, with_jitter);
+  // Not in the order in which they were taken, or opposite views in turn.
+  EXPECT_FALSE(continued_rad(in_rad({0, 50, 20, 70, 30})));
+  EXPECT_FALSE(continued_rad(in_rad({0, 180, 1, 181})));
+}
+
+TEST(AngleBasis, DriftsByOneFromTheFirstViewToTheLast) {
+  for (const double step_deg : {3.0, -3.0}) {
+    const CircularScan scan = small_scan(AxisAlong::Rows, step_deg);
+    const AngleBasis basis = {1, sweep_of(scan)};
+    ASSERT_EQ(basis.size(), 4);
+    EXPECT_NEAR(basis.at(scan.angles_rad.front())[3], -0.5, kRounding);
+    EXPECT_NEAR(basis.at(scan.angles_rad[1])[3], -0.5 + 1.0 / 119.0, kRounding);
+    EXPECT_NEAR(basis.at(scan.angles_rad.back())[3], 0.5, kRounding);
+  }
+  // The last view has the first one's angle, but comes after all others.
+  CircularScan closed = small_scan();
+  closed.angles_rad.push_back(closed.angles_rad.front() + 2.0 * std::numbers::pi);
+  const AngleBasis basis = {0, sweep_of(closed)};
+  EXPECT_NEAR(basis.at(closed.angles_rad.front())[1], -0.5, kRounding);
+  EXPECT_NEAR(basis.at(closed.angles_rad.back())[1], 0.5, kRounding);
+  std::swap(closed.angles_rad[10], closed.angles_rad[60]);
+  EXPECT_FALSE(sweep_of(closed));
 }
 
 TEST(AngleShares, AreHalfTheGapsAndFillTheCircle) {
@@ -213,7 +225,7 @@ TEST(CircularScan, NamesWhatIsImpossible) {
 
 TEST(CalibrationDistance, KnowsNoMotionOfTheObject) {
   const CircularScan scan = small_scan();
-  const ScanCalibration stated = ScanCalibration::nominal(scan, 3);
+  const ScanCalibration stated = ScanCalibration::nominal(scan, {3, sweep_of(scan)});
   EXPECT_NEAR(calibration_distance_px(scan, stated, stated, 10.0, 10.0), 0.0, kRounding);
   ScanCalibration other = stated;
   other.column_px.coefficients[3] = 0.5;  // cos 2a: root mean square 0.5 / sqrt(2)

@@ -25,6 +25,7 @@ SelfCalibrationOptions quick_options() {
   options.working_px = 72;
   options.search_px = 36;
   options.coarse_px = 4.0;
+  // Projections hardly tell the distance: the search may end at its limit.
   options.focal_share = 0.02;
   options.tilt_deg = 0.0;
   return options;
@@ -32,7 +33,7 @@ SelfCalibrationOptions quick_options() {
 
 /// A detector off its place whose foot and rotation wobble and drift, and farther than stated.
 ScanCalibration wobbling(const CircularScan& scan) {
-  ScanCalibration truth = ScanCalibration::nominal(scan, 2);
+  ScanCalibration truth = ScanCalibration::nominal(scan, {2, sweep_of(scan)});
   truth.source_to_detector_mm *= 1.02;
   truth.column_px.coefficients << 38.0, 0.3, -0.2, 0.4, 0.3, 0.5;
   truth.row_px.coefficients << 29.0, -0.3, 0.4, 0.3, -0.4, -0.4;
@@ -48,13 +49,16 @@ TEST(SelfCalibration, FindsAKnownWobbleFromEvenViewsForOddOnes) {
   const std::vector<int> even = CircularScan::every(0, 2, 120);
   const std::vector<int> odd = CircularScan::every(1, 2, 120);
   const SelfCalibrationOptions options = quick_options();
-  const ScanCalibration stated = ScanCalibration::nominal(scan, 2);
+  const ScanCalibration stated = ScanCalibration::nominal(scan, {2, sweep_of(scan)});
   const ScanCalibration found = self_calibrate(images, even, options, pool, [](const auto&) {});
   // A pixel is 0.6 mm at the axis, and 60 views 6 degrees apart leave streaks: a tenth of a pixel.
   const double before = calibration_distance_px(scan, truth, stated, 10.0, 10.0);
   const double after = calibration_distance_px(scan, truth, found, 10.0, 10.0);
   EXPECT_GT(before, 0.5);
   EXPECT_LT(after, 0.1);
+  // The drift is found as such: 0.5 and -0.4 px.
+  EXPECT_NEAR(found.column_px.coefficients[5], truth.column_px.coefficients[5], 0.1);
+  EXPECT_NEAR(found.row_px.coefficients[5], truth.row_px.coefficients[5], 0.1);
   const double held_out = held_out_residual(images, found, even, odd, options, pool).rms_px;
   EXPECT_LT(held_out, 0.05);
   // A wrong geometry shows. The reconstruction shares it and yields: half of its 0.35 px remain.
@@ -63,9 +67,22 @@ TEST(SelfCalibration, FindsAKnownWobbleFromEvenViewsForOddOnes) {
   EXPECT_GT(held_out_residual(images, wrong, even, odd, options, pool).rms_px, 0.15);
 }
 
+TEST(SelfCalibration, FollowsWhatItsViewsCanTell) {
+  CircularScan scan = small_scan();
+  SelfCalibrationOptions options;
+  EXPECT_EQ(options.basis_for(scan, 180).harmonics, 8);
+  EXPECT_EQ(options.basis_for(scan, 30).harmonics, 3);
+  EXPECT_EQ(options.basis_for(scan, 7).harmonics, 0);
+  EXPECT_EQ(options.basis_for(scan, 30).size(), 8);
+  std::swap(scan.angles_rad[3], scan.angles_rad[90]);  // views whose angles do not tell time
+  EXPECT_EQ(options.basis_for(scan, 30).size(), 7);
+  options.omits_drift = true;
+  EXPECT_EQ(options.basis_for(small_scan(), 30).size(), 7);
+}
+
 TEST(SelfCalibration, RefusesAScanThatTurnsTheOtherWay) {
   const CircularScan scan = small_scan();
-  ScanImages images = simulated_scan(scan, ScanCalibration::nominal(scan, 0), lopsided_balls());
+  ScanImages images = simulated_scan(scan, ScanCalibration::nominal(scan), lopsided_balls());
   images.scan = small_scan(AxisAlong::Rows, -3.0);
   ThreadPool pool(2);
   SelfCalibrationOptions options = quick_options();
@@ -80,7 +97,7 @@ TEST(SelfCalibration, RefusesAScanThatTurnsTheOtherWay) {
 
 /// A rod about the axis looks alike from either side: noise must not decide.
 TEST(SelfCalibration, TakesTheStatedDirectionWhereImagesTellNone) {
-  const ScanCalibration truth = ScanCalibration::nominal(small_scan(), 0);
+  const ScanCalibration truth = ScanCalibration::nominal(small_scan());
   std::vector<test::Ball> rod;
   for (int i = -3; i <= 3; ++i) rod.push_back({{0.0, 0.0, 4.0 * i}, 6.0, 0.02});
   const ScanImages images = simulated_scan(small_scan(), truth, rod);
@@ -101,7 +118,7 @@ TEST(SelfCalibration, TakesTheStatedDirectionWhereImagesTellNone) {
 
 TEST(SelfCalibration, RefusesAScanOfNothing) {
   const CircularScan scan = small_scan();
-  const ScanImages images = simulated_scan(scan, ScanCalibration::nominal(scan, 0), {});
+  const ScanImages images = simulated_scan(scan, ScanCalibration::nominal(scan), {});
   ThreadPool pool(1);
   EXPECT_THROW(
       self_calibrate(
@@ -111,7 +128,7 @@ TEST(SelfCalibration, RefusesAScanOfNothing) {
 
 TEST(ViewAlignment, FindsAKnownMotion) {
   const CircularScan scan = small_scan();
-  const ScanCalibration here = ScanCalibration::nominal(scan, 0);
+  const ScanCalibration here = ScanCalibration::nominal(scan);
   ScanCalibration there = here;
   there.column_px.coefficients[0] += 0.2;
   there.row_px.coefficients[0] -= 0.1;
@@ -140,7 +157,7 @@ TEST(ViewAlignment, FindsAKnownMotion) {
 /// What a reconstruction blurs stays; what is gone leaves more than its edges.
 TEST(ViewAlignment, ResidualsTellWhatMovedFromWhatIsPredictedRoughly) {
   const CircularScan scan = small_scan();
-  const ScanCalibration here = ScanCalibration::nominal(scan, 0);
+  const ScanCalibration here = ScanCalibration::nominal(scan);
   const std::vector<unsigned char> all(static_cast<std::size_t>(scan.size_px.prod()), 1);
   const BandPass band_pass(scan.size_px.x(), scan.size_px.y(), all, 1.0, 4.0);
   const CameraGeometry camera = scan_camera(scan, here, 0.3);
@@ -176,7 +193,7 @@ TEST(ViewAlignment, ResidualsTellWhatMovedFromWhatIsPredictedRoughly) {
 
 TEST(ViewAlignment, SaysHowMuchOfAShiftNoiseOfThePredictionLetsThrough) {
   const CircularScan scan = small_scan();
-  const ScanCalibration here = ScanCalibration::nominal(scan, 0);
+  const ScanCalibration here = ScanCalibration::nominal(scan);
   ScanCalibration there = here;
   there.column_px.coefficients[0] += 0.2;
   const std::vector<unsigned char> all(static_cast<std::size_t>(scan.size_px.prod()), 1);

@@ -787,6 +787,9 @@ TEST(PoseDistances, OfARotationDependOnWhereTheBoxIs) {
   const std::vector<PoseDistanceRow> found = pose_distances({far, run_with_ends(b, second)});
   EXPECT_NEAR(found.at(0).distance_mm.median, 200 * std::sin(0.5 * kRadPerDeg), 1e-3);
   EXPECT_NEAR(found.at(0).rotation_deg.median, 1.0, 1e-9);
+  const CsvTable table = pose_distances_table(found);
+  for (const char* const column : {"mean", "median", "p95", "max"})
+    EXPECT_NEAR(table.number(0, std::string(column) + "_rotation_deg"), 1.0, 1e-6) << column;
 }
 
 TEST(PoseDistances, OfARunThatStatesNoTargetAreAFileError) {
