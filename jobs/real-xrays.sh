@@ -28,8 +28,8 @@ stop, run the same command again to continue. Needs the programs in build/releas
   --raycast-starts N        of each interval's starts, so many also by ray casting, with both steps; 0: no ray casting, and
                             no finish                                                                            [1]
   --calibration OPTIONS     options of af-scan, in one word, e.g. "--as-stated" for a calibrated scanner
-  --field OPTIONS           options of af-precompute, in one word; the default's fields are finer, and eight times as
-                            large as those of --preset standard     [--preset standard --st-nodes 1024 --codewords 65536]
+  --field OPTIONS           options of af-precompute, in one word, for the fields of all presets [--preset standard; robust, which
+                            is compared with ray casting, has --st-nodes 1024 --codewords 65536, too: eight times as large]
   --max-rotation-deg X      range of the fields, degrees                                                         [16]
   --max-translation-mm X    range of the fields, mm                                                              [40]
   --quick                   2 pairs, 1 start in each of 15 intervals, ray casting from 4 starts per case and preset
@@ -41,8 +41,7 @@ TEXT
 
 folder="" scan="" target="$PWD/real-xrays" pairs=5 presets=robust,fast,paper starts=8 intervals=15 raycast_starts=1
 raycast_intervals=15 scan_words="" max_rotation_deg=16 max_translation_mm=40 ranks=$(core_count) seed=1
-# What the X-rays are compared to must be as exact as ray casting.
-field_words="--preset standard --st-nodes 1024 --codewords 65536"
+field_words="--preset standard" robust_field_words="--preset standard --st-nodes 1024 --codewords 65536"
 while (($# > 0)); do
   case "$1" in
     --scan) need_value "$1" $#; scan=$2; shift ;;
@@ -53,7 +52,7 @@ while (($# > 0)); do
     --intervals) need_value "$1" $#; need_count "$1" "$2"; intervals=$2; shift ;;
     --raycast-starts) need_value "$1" $#; need_seed "$1" "$2"; raycast_starts=$2; shift ;;
     --calibration) need_value "$1" $#; scan_words=$2; shift ;;
-    --field) need_value "$1" $#; field_words=$2; shift ;;
+    --field) need_value "$1" $#; field_words=$2 robust_field_words=$2; shift ;;
     --max-rotation-deg) need_value "$1" $#; max_rotation_deg=$2; shift ;;
     --max-translation-mm) need_value "$1" $#; max_translation_mm=$2; shift ;;
     --quick) pairs=2 starts=1 raycast_starts=1 raycast_intervals=4 ;;
@@ -78,6 +77,7 @@ fi
 folder=$(realpath "$folder") scan=$(realpath "$scan")
 ((raycast_intervals <= intervals)) || raycast_intervals=$intervals
 IFS=, read -r -a preset_list <<<"$presets"
+read -r -a robust_field_options <<<"$robust_field_words"
 read -r -a field_options <<<"$field_words"
 read -r -a scan_options <<<"$scan_words"
 
@@ -113,14 +113,31 @@ while IFS=$'\t' read -r case_name camera; do
   cameras_of[$case_name]+="$camera "
 done <<<"$views"
 
-# A single view has its pair's nominal pose, and so its field.
+# field_of PRESET CASE CAMERA: its file. A single view has its pair's nominal pose, and so its field.
+field_of() {
+  local kind=""
+  [[ "$1" != robust || "$robust_field_words" == "$field_words" ]] || kind=-robust
+  echo "$output/fields/pair-${2#*-}-$3$kind.af.h5"
+}
+
+# make_field FILE CASE CAMERA OPTIONS...
+make_field() {
+  local file=$1 case_name=$2 camera=$3
+  shift 3
+  stage "field $(basename "$file" .af.h5)" "$file" run_ranks "$ranks" \
+    "$bin/af-precompute" --study "$study" --case "$case_name" --camera "$camera" "$@" \
+    --max-rotation-deg "$max_rotation_deg" --max-translation-mm "$max_translation_mm" --water-mu-per-mm "$water" \
+    --seed "$seed" -o "$file"
+}
+
 for case_name in "${case_names[@]}"; do
   [[ "$case_name" == pair-* ]] || continue
   for camera in ${cameras_of[$case_name]}; do
-    stage "field of $camera, $case_name" "$output/fields/$case_name-$camera.af.h5" run_ranks "$ranks" \
-      "$bin/af-precompute" --study "$study" --case "$case_name" --camera "$camera" "${field_options[@]}" \
-      --max-rotation-deg "$max_rotation_deg" --max-translation-mm "$max_translation_mm" --water-mu-per-mm "$water" \
-      --seed "$seed" -o "$output/fields/$case_name-$camera.af.h5"
+    for preset in "${preset_list[@]}"; do
+      options=("${field_options[@]}")
+      [[ "$preset" != robust ]] || options=("${robust_field_options[@]}")
+      make_field "$(field_of "$preset" "$case_name" "$camera")" "$case_name" "$camera" "${options[@]}"
+    done
   done
 done
 
@@ -134,15 +151,20 @@ register() {
 }
 
 run_folders=() finish_folders=()
-for case_name in "${case_names[@]}"; do
+# fields_of PRESET CASE: sets of_case to the options that name its fields.
+fields_of() {
+  local camera
   of_case=()
-  for camera in ${cameras_of[$case_name]}; do
-    of_case+=(--field "$camera=$output/fields/pair-${case_name#*-}-$camera.af.h5")
-  done
+  for camera in ${cameras_of[$2]}; do of_case+=(--field "$camera=$(field_of "$1" "$2" "$camera")"); done
+}
+
+for case_name in "${case_names[@]}"; do
+  fields_of "${preset_list[0]}" "$case_name"
   register "starts/$case_name" starts.csv "$case_name" "${of_case[@]}" --starts-per-interval "$starts" \
     --start-rule within-range --starts-only
   from=(--starts-from "$output/starts/$case_name/starts.csv" --starts-per-interval "$starts")
   for preset in "${preset_list[@]}"; do
+    fields_of "$preset" "$case_name"
     both=(--renderer field)
     if ((raycast_starts > 0)); then
       both=(--renderer both --raycast-intervals "$raycast_intervals" --raycast-starts-per-interval "$raycast_starts")
