@@ -120,23 +120,20 @@ field_of() {
   echo "$output/fields/pair-${2#*-}-$3$kind.af.h5"
 }
 
-# make_field FILE CASE CAMERA OPTIONS...
-make_field() {
-  local file=$1 case_name=$2 camera=$3
-  shift 3
-  stage "field $(basename "$file" .af.h5)" "$file" run_ranks "$ranks" \
-    "$bin/af-precompute" --study "$study" --case "$case_name" --camera "$camera" "$@" \
-    --max-rotation-deg "$max_rotation_deg" --max-translation-mm "$max_translation_mm" --water-mu-per-mm "$water" \
-    --seed "$seed" -o "$file"
-}
-
+declare -A is_made=()
 for case_name in "${case_names[@]}"; do
   [[ "$case_name" == pair-* ]] || continue
   for camera in ${cameras_of[$case_name]}; do
     for preset in "${preset_list[@]}"; do
+      file=$(field_of "$preset" "$case_name" "$camera")
+      [[ ! -v is_made["$file"] ]] || continue
+      is_made[$file]=yes
       options=("${field_options[@]}")
       [[ "$preset" != robust ]] || options=("${robust_field_options[@]}")
-      make_field "$(field_of "$preset" "$case_name" "$camera")" "$case_name" "$camera" "${options[@]}"
+      stage "field $(basename "$file" .af.h5)" "$file" run_ranks "$ranks" \
+        "$bin/af-precompute" --study "$study" --case "$case_name" --camera "$camera" "${options[@]}" \
+        --max-rotation-deg "$max_rotation_deg" --max-translation-mm "$max_translation_mm" --water-mu-per-mm "$water" \
+        --seed "$seed" -o "$file"
     done
   done
 done
@@ -150,7 +147,6 @@ register() {
     --intervals "$intervals" --seed "$seed" -o "$output/$result" "$@"
 }
 
-run_folders=() finish_folders=()
 # fields_of PRESET CASE: sets of_case to the options that name its fields.
 fields_of() {
   local camera
@@ -158,6 +154,7 @@ fields_of() {
   for camera in ${cameras_of[$2]}; do of_case+=(--field "$camera=$(field_of "$1" "$2" "$camera")"); done
 }
 
+run_folders=() finish_folders=()
 for case_name in "${case_names[@]}"; do
   fields_of "${preset_list[0]}" "$case_name"
   register "starts/$case_name" starts.csv "$case_name" "${of_case[@]}" --starts-per-interval "$starts" \

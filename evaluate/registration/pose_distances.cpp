@@ -133,6 +133,11 @@ Distances distances_of(const MethodEnds& a, const MethodEnds& b) {
   return distances;
 }
 
+std::string percentiles_text(const SampleSummary& summary) {
+  return fixed_text(summary.median, 4) + ", " + fixed_text(summary.percentile_95, 4) + ", " +
+         fixed_text(summary.maximum, 4);
+}
+
 std::string claim_of(const CaseEquivalence& found) {
   if (!found.has_enough_cases()) return "too few patients";
   return found.is_shown() ? "yes" : "not shown";
@@ -196,15 +201,6 @@ CsvTable pose_distances_table(const std::vector<PoseDistanceRow>& rows) {
                    number_text(row.rotation_deg.maximum)});
   return table;
 }
-
-namespace {
-
-std::string percentiles_text(const SampleSummary& summary) {
-  return fixed_text(summary.median, 4) + ", " + fixed_text(summary.percentile_95, 4) + ", " +
-         fixed_text(summary.maximum, 4);
-}
-
-}  // namespace
 
 std::string pose_distances_markdown(const std::vector<PoseDistanceRow>& rows) {
   if (rows.empty()) return "";

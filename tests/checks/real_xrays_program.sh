@@ -26,7 +26,7 @@ prefix/bin/af-simulate --phantom head --rig rig.toml --cone-beam 72 --no-fiducia
   >out 2>err || fail "af-simulate: $(cat err)"
 
 job() {
-  prefix/libexec/attenuation-fields/jobs/real-xrays.sh "$@" --output study --pairs 1 --presets fast --intervals 4 \
+  prefix/libexec/attenuation-fields/jobs/real-xrays.sh "$@" --output study --pairs 1 --presets fast,paper --intervals 4 \
     --starts-per-interval 1 --raycast-starts 0 --ranks 2 --field '--slabs 1 --uv-nodes 12 --st-nodes 97 --codewords 512' \
     --calibration '--rounds 1 --search-px 48 --working-px 96 --tilt-deg 0' >out 2>err
 }
@@ -36,6 +36,7 @@ grep -q '^  source_to_detector_mm = 900' out || fail "a stated distance was not 
 # Two views of 4 mm pixels: every start up to 8 mm ends right.
 grep -q '^| pair-01-fast | .* | 4 of 4' study/methods.md || fail "not all starts ended right: $(cat study/methods.md)"
 [[ -s study/report.html ]] || fail "no report"
+[[ $(grep -c '^field ' out) == 2 ]] || fail "two presets share the fields of two cameras: $(cat out)"
 
 job scan || fail "the same command again: $(cat out err)"
 ! grep -q ' min \| s$' out || fail "a finished stage ran again: $(cat out)"
