@@ -16,7 +16,7 @@ FOLDER holds the images of a circular cone-beam scan. Finds the scan's true geom
 CT from them, takes odd views as X-rays, in pairs about 90 degrees apart and alone, builds a field for each X-ray,
 registers from starts up to 30 mm from the true pose, drawn within the range of the fields, with every preset, by fields
 and by ray casting. All but paper register again by fields with a finish by ray casting (--correct), beside ray casting
-with the finish's steps (0.5 mm instead of 1). Writes methods.md, finishes.md, distances.md and report.html. After a
+with the finish's steps (0.25 mm instead of 1). Writes methods.md, finishes.md, distances.md and report.html. After a
 stop, run the same command again to continue. Needs the programs in build/release/bin (or installed).
 
   --scan FILE               geometry of the scan: af-inspect --template scan prints one to fill in        [FOLDER/scan.toml]
@@ -29,7 +29,8 @@ stop, run the same command again to continue. Needs the programs in build/releas
                             no finish                                                                            [1]
   --calibration OPTIONS     options of af-scan, in one word, e.g. "--as-stated" for a calibrated scanner
   --field OPTIONS           options of af-precompute, in one word, for the fields of all presets [--preset standard; robust, which
-                            is compared with ray casting, has --st-nodes 1024 --codewords 65536, too: eight times as large]
+                            is compared with ray casting, has --codewords 65536 and (s,t) nodes half a voxel apart, too:
+                            up to twenty times as large]
   --max-rotation-deg X      range of the fields, degrees                                                         [16]
   --max-translation-mm X    range of the fields, mm                                                              [40]
   --quick                   2 pairs, 1 start in each of 15 intervals, ray casting from 4 starts per case and preset
@@ -41,7 +42,7 @@ TEXT
 
 folder="" scan="" target="$PWD/real-xrays" pairs=5 presets=robust,fast,paper starts=8 intervals=15 raycast_starts=1
 raycast_intervals=15 scan_words="" max_rotation_deg=16 max_translation_mm=40 ranks=$(core_count) seed=1
-field_words="--preset standard" robust_field_words="--preset standard --st-nodes 1024 --codewords 65536"
+field_words="--preset standard" robust_field_words=""
 while (($# > 0)); do
   case "$1" in
     --scan) need_value "$1" $#; scan=$2; shift ;;
@@ -77,7 +78,6 @@ fi
 folder=$(realpath "$folder") scan=$(realpath "$scan")
 ((raycast_intervals <= intervals)) || raycast_intervals=$intervals
 IFS=, read -r -a preset_list <<<"$presets"
-read -r -a robust_field_options <<<"$robust_field_words"
 read -r -a field_options <<<"$field_words"
 read -r -a scan_options <<<"$scan_words"
 
@@ -101,10 +101,15 @@ stage "scan" "$study" "$bin/af-scan" --scan "$scan" --folder "$folder" --pairs "
   "${scan_options[@]}" --force -o "$output/study"
 water=$(sed -n 's/^water_mu_per_mm = //p' "$output/study/calibration.toml")
 [[ -n "$water" ]] || die 6 "$output/study/calibration.toml has no water_mu_per_mm"
+# Look-up loses what is finer than two voxels where nodes are a voxel apart, and then ends elsewhere than ray casting.
+half_voxel=$(sed -n 's/^ct_voxel_mm = //p' "$output/study/calibration.toml" | awk '{ printf "%.4f", $1 / 2 }')
+[[ -n "$half_voxel" ]] || die 6 "$output/study/calibration.toml has no ct_voxel_mm"
+robust_field_words=${robust_field_words:---preset standard --codewords 65536 --st-spacing-mm $half_voxel}
 stage_inputs="$(sha256sum <"$study") $(sha256sum <"$output/study/calibration.toml")"
 
 # --- fields, starts, registrations -------------------------------------------------------------------------------
 
+read -r -a robust_field_options <<<"$robust_field_words"
 declare -A cameras_of=()
 case_names=()
 views=$("$bin/af-inspect" --list-views "$study")
@@ -170,7 +175,7 @@ for case_name in "${case_names[@]}"; do
     run_folders+=("$output/runs/$case_name-$preset")
     if ((raycast_starts > 0)) && [[ "$preset" != paper ]]; then
       register "finishes/$case_name-$preset-corrected" summary.json "$case_name" "${of_case[@]}" "${from[@]}" \
-        --preset "$preset" --correct "${both[@]}"
+        --preset "$preset" --correct --correct-step-mm 0.25 "${both[@]}"
       finish_folders+=("$output/finishes/$case_name-$preset-corrected")
     fi
   done

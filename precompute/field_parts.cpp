@@ -2,6 +2,7 @@
 #include "precompute/field_parts.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "base/error.h"
@@ -13,9 +14,11 @@
 #include "precompute/casting/joined_caster.h"
 #include "precompute/casting/least_squares_caster.h"
 #include "precompute/casting/unit_costs.h"
+#include "precompute/formatted_text.h"
 #include "precompute/plan/orbit_text.h"
 #include "study/rig_file.h"
 #include "study/shared_inputs.h"
+#include "text/toml_reader.h"
 
 namespace af {
 
@@ -158,6 +161,23 @@ LightSlab sized_planes(const FieldSource& source,
                           depth_slabs.st_plane_y_mm,
                           source.sources},
                          source.more_cameras);
+}
+
+int st_nodes_at_most_apart(const std::vector<FieldPart>& parts, double spacing_mm) {
+  constexpr int kMultiple = 32;
+  double longest_mm = 0.0;
+  for (const FieldPart& part : parts)
+    for (const SlabGeometry& slab : part.light_slab.slabs)
+      longest_mm = std::max({longest_mm, slab.s.length_mm(), slab.t.length_mm()});
+  const double nodes = std::ceil(longest_mm / spacing_mm) + 1.0;
+  if (!(nodes <= kMostPlaneNodes))
+    throw InputError("--st-spacing-mm",
+                     toml_number(spacing_mm),
+                     "the (s,t) planes are up to " + formatted("%.1f", longest_mm) +
+                         " mm wide and take at most " + std::to_string(kMostPlaneNodes) +
+                         " nodes, that is " +
+                         formatted("%.4g", longest_mm / (kMostPlaneNodes - 1)) + " mm or more");
+  return (static_cast<int>(nodes) + kMultiple - 1) / kMultiple * kMultiple;
 }
 
 FieldLattice lattice_of(const std::vector<FieldPart>& parts) {

@@ -113,7 +113,10 @@ class PrecomputeRun {
     lattice_ = lattice_of(parts_);
     clock_.end("read");
     const bool casting_needs_it = caster_named(options_.caster).needs_resampled;
-    if (!casting_needs_it && !options_.needs_probe() && has_one_central_slab()) return;
+    if (!casting_needs_it && !options_.needs_probe() && has_one_central_slab()) {
+      space_nodes(std::vector<DepthSlabs>(parts_.size(), DepthSlabs{{}, {0.0}}));
+      return;
+    }
     for (std::size_t i = 0; i < parts_.size(); ++i) {
       note.change(parts_.size() == 1 ? "resampling the CT"
                                      : "resampling the CT for " + std::to_string(i + 1) + " of " +
@@ -122,13 +125,26 @@ class PrecomputeRun {
     }
     clock_.end("resample");
     if (options_.needs_probe()) choose(parts_[parts_.size() / 2]);
+    std::vector<DepthSlabs> depth_slabs;
     for (FieldPart& part : parts_) {
-      size_planes(part, has_one_central_slab() ? DepthSlabs{{}, {0.0}} : all_or_none(world_, [&] {
-                    return choose_depth_slabs(
-                        *part.resampled, options_.design().slabs, options_.st_plane_rule());
-                  }));
+      depth_slabs.push_back(
+          has_one_central_slab() ? DepthSlabs{{}, {0.0}} : all_or_none(world_, [&] {
+            return choose_depth_slabs(
+                *part.resampled, options_.design().slabs, options_.st_plane_rule());
+          }));
+      size_planes(part, depth_slabs.back());
       if (!casting_needs_it) part.resampled = nullptr;
     }
+    lattice_ = lattice_of(parts_);
+    space_nodes(depth_slabs);
+  }
+
+  /// Collective. Where the options state a spacing, the nodes of the (s,t) planes that it takes.
+  void space_nodes(const std::vector<DepthSlabs>& depth_slabs) {
+    if (!options_.st_spacing_mm) return;
+    options_ = options_.with_st_nodes(all_or_none(
+        world_, [&] { return st_nodes_at_most_apart(parts_, *options_.st_spacing_mm); }));
+    for (std::size_t i = 0; i < parts_.size(); ++i) size_planes(parts_[i], depth_slabs[i]);
     lattice_ = lattice_of(parts_);
   }
 

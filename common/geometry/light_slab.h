@@ -19,7 +19,8 @@ struct GridAxis {
   double last_mm = 0.0;
   int nodes = 2;
 
-  [[nodiscard]] double spacing_mm() const { return (last_mm - first_mm) / (nodes - 1); }
+  [[nodiscard]] double length_mm() const { return last_mm - first_mm; }
+  [[nodiscard]] double spacing_mm() const { return length_mm() / (nodes - 1); }
   [[nodiscard]] double position_mm(int node) const { return first_mm + spacing_mm() * node; }
   /// Position in continuous node units: 0 on the first edge, nodes - 1 on the last.
   [[nodiscard]] double node_coordinate(double position_mm) const {

@@ -118,14 +118,22 @@ void describe_casting(Fields& field, PrecomputeOptions& options) {
       options.uv_nodes,
       "Viewpoints along each side of the (u,v) plane, both edges included [that of the preset, or "
       "as chosen; 64 where parts of the design are stated]")
-      .within(2, 4096)
+      .within(2, kMostPlaneNodes)
       .decides(kCastingStage);
   field("st_nodes",
         options.st_nodes,
         "Nodes along each side of the uncropped (s,t) plane, both edges included [that of the "
         "preset, or as chosen; 256 where parts of the design are stated]")
-      .within(2, 4096)
+      .within(2, kMostPlaneNodes)
       .decides(kCastingStage);
+  field("st_spacing_mm",
+        options.st_spacing_mm,
+        "Instead: as many nodes as let them stand at most so far apart on every (s,t) plane, mm. "
+        "Half the CT's voxel is as fine as its DRRs are")
+      .above(0.0)
+      .finite()
+      .excludes({"--st-nodes", "--target-psnr-db", "--max-field-size", "--max-drr-ms"})
+      .not_recorded("the nodes that follow from it are");
   field("uv_samples",
         options.uv_samples,
         "What the field holds of a viewpoint: point (line integrals of its rays), or least-squares "
@@ -323,8 +331,8 @@ DesignParts PrecomputeOptions::stated_parts() const {
 }
 
 const DesignPreset& PrecomputeOptions::design_preset() const {
-  const bool has_parts = slabs || uv_nodes || st_nodes || codewords || uv_samples || look_up ||
-                         tile_coding || tile_filter;
+  const bool has_parts = slabs || uv_nodes || st_nodes || st_spacing_mm || codewords ||
+                         uv_samples || look_up || tile_coding || tile_filter;
   const char* const whole = is_atlas() ? kAtlasPreset : kDefaultPreset;
   return design_preset_named(preset.value_or(has_parts ? kPaperPreset : whole));
 }
@@ -348,6 +356,13 @@ bool PrecomputeOptions::packs_by_codebook_tree() const {
 
 double min_improvement_of(const FieldDesign& design) {
   return design.slabs == 1 ? CodebookOptions{}.min_relative_improvement : 0.015;
+}
+
+PrecomputeOptions PrecomputeOptions::with_st_nodes(int nodes) const {
+  PrecomputeOptions options = *this;
+  options.st_nodes = nodes;
+  options.st_spacing_mm.reset();
+  return options;
 }
 
 PrecomputeOptions PrecomputeOptions::with_design(const FieldDesign& design) const {
@@ -416,6 +431,10 @@ std::vector<std::string> problems(const PrecomputeOptions& options) {
     found.emplace_back(
         "tile_filter = neighbours: a probe forecasts fields without one; leave it out, or state "
         "slabs, uv_nodes, st_nodes and codewords instead of a limit");
+  if (options.needs_probe() && options.st_spacing_mm)
+    found.emplace_back(
+        "st_spacing_mm: a probe chooses the nodes of the (s,t) planes; leave it out, or state "
+        "slabs, uv_nodes and codewords instead of a limit");
   const FieldDesign design = options.design();
   if (!options.needs_probe() && design.fits_uv && design.uv_nodes < kFewestFittedViewpoints)
     found.push_back("uv_nodes = " + std::to_string(design.uv_nodes) + ": must be at least " +

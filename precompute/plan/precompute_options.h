@@ -52,6 +52,7 @@ struct PrecomputeOptions {
   std::optional<std::string> st_plane;
   std::optional<int> uv_nodes;
   std::optional<int> st_nodes;
+  std::optional<double> st_spacing_mm;     ///< instead: st_nodes follow from the planes' sizes
   std::optional<std::string> uv_samples;   ///< "point" or "least-squares"
   std::optional<std::string> tile_filter;  ///< "none" or "neighbours"
   std::optional<std::string> look_up;
@@ -100,6 +101,8 @@ struct PrecomputeOptions {
   [[nodiscard]] bool packs_by_codebook_tree() const;
   /// The design: of the preset, with the parts that are stated.
   [[nodiscard]] FieldDesign design() const { return stated_parts().over(design_preset().design); }
+  /// These options with `nodes` in place of the spacing on the (s,t) planes.
+  [[nodiscard]] PrecomputeOptions with_st_nodes(int nodes) const;
   /// These options with the design stated.
   [[nodiscard]] PrecomputeOptions with_design(const FieldDesign& design) const;
   [[nodiscard]] TrainingSelection training_selection() const {
@@ -114,6 +117,9 @@ struct PrecomputeOptions {
   /// Fills in the design, unless a probe has to choose it, and the rule that places (s,t) planes.
   [[nodiscard]] PrecomputeOptions in_force() const;
 };
+
+/// Most nodes along a side of the (u,v) or (s,t) plane.
+inline constexpr int kMostPlaneNodes = 4096;
 
 /// Default step of the means of mean-removed tiles, in levels of 65535.
 inline constexpr int kDefaultMeanStep = 64;

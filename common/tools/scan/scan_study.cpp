@@ -242,6 +242,7 @@ std::string calibration_text(const CalibratedScan& scan, double most_masked) {
   text += series_text("detector_rotation_rad", found.rotation_rad);
   text += "stated_source_to_detector_mm = " + toml_number(scan.images.scan.source_to_detector_mm) +
           "\n";
+  text += "ct_voxel_mm = " + toml_number(scan.ct.grid.spacing_mm.minCoeff()) + "\n";
   text += "water_mu_per_mm = " + toml_number(scan.water_mu_per_mm) + "\n";
   text +=
       "held_out_cost = " + toml_number(after.cost) + "  # of the odd views' detail, unexplained\n";
