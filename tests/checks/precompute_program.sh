@@ -80,6 +80,26 @@ done
 [[ -z $(find . -name '*.h5*') ]] || fail 'the dry run wrote a file'
 
 hash_of() { sed -n 's/.*sha256 //p' "$1"; }
+# Nodes by their spacing: just as many as let them stand no farther apart on any (s,t) plane, and the field is that of this count.
+spaced=("${common[@]:0:8}" --uv-nodes 9 --codewords 200 --training-fraction 0.5 --caster shear-warp)
+expect 2 'excludes' "${spaced[@]}" --st-nodes 64 --st-spacing-mm 4 -o refused.h5
+expect 2 'excludes' "${spaced[@]}" --max-field-size 1MB --st-spacing-mm 4 -o refused.h5
+expect 3 'st_spacing_mm = 0: must be' "${spaced[@]}" --st-spacing-mm 0 -o refused.h5
+expect 2 "st-spacing-mm: 'nan'" "${spaced[@]}" --st-spacing-mm nan -o refused.h5
+expect 3 'st-spacing-mm = 0.01: the (s,t) planes are up to .* take at most 4096 nodes' "${spaced[@]}" --st-spacing-mm 0.01 -o refused.h5
+widest() { sed -n 's/.*(s,t) plane.* nodes, \([0-9.]*\) x \([0-9.]*\) mm apart.*/\1\n\2/p' "$1" | sort -g | tail -1; }
+for slabs in 1 3; do
+  "$program" "${spaced[@]}" --slabs "$slabs" --st-spacing-mm 4 --dry-run >spaced-dry.txt
+  nodes=$(sed -n 's/.*(s,t) plane.* mm, \([0-9]*\) x .*/\1/p' spaced-dry.txt | sort -u)
+  [[ $(awk -v at="$(widest spaced-dry.txt)" 'BEGIN { print (at <= 4) }') == 1 ]] || fail "nodes too far apart: $(cat spaced-dry.txt)"
+  "$program" "${spaced[@]}" --slabs "$slabs" --st-nodes $((nodes - 32)) --dry-run >fewer-dry.txt
+  [[ $(awk -v at="$(widest fewer-dry.txt)" 'BEGIN { print (at > 4) }') == 1 ]] || fail "$nodes nodes: fewer would do: $(cat fewer-dry.txt)"
+  "$program" "${spaced[@]}" --slabs "$slabs" --st-spacing-mm 4 -o spaced.h5 >spaced.txt 2>/dev/null
+  "$program" "${spaced[@]}" --slabs "$slabs" --st-nodes "$nodes" -o counted.h5 >counted.txt 2>/dev/null
+  [[ -n $(hash_of spaced.txt) && $(hash_of spaced.txt) == "$(hash_of counted.txt)" ]] ||
+    fail "$slabs slabs: a spacing gives another field than its $nodes nodes"
+done
+
 # same_hash RANKS EXPECTED OPTIONS...
 same_hash() {
   local ranks=$1 expected=$2

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "precompute/plan/precompute_options.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "base/error.h"
@@ -10,6 +11,9 @@
 
 namespace af {
 namespace {
+
+using ::testing::Contains;
+using ::testing::HasSubstr;
 
 TEST(PrecomputeOptions, TrainsOn64TilesPerCodewordUnlessAShareIsStated) {
   PrecomputeOptions options;
@@ -120,6 +124,21 @@ TEST(FieldDesignOfOptions, IsProbedForWithinABudgetUnlessAllIsStated) {
   EXPECT_EQ(options.stated_parts().slabs, 4);
   EXPECT_FALSE(options.stated_parts().uv_nodes.has_value());
   EXPECT_FALSE(options.with_design({4, 16, 384, 16384, "cubic"}).needs_probe());
+}
+
+TEST(FieldDesignOfOptions, ASpacingStandsForNodesThatAreNotKnownYet) {
+  PrecomputeOptions options;
+  options.st_spacing_mm = 0.5;
+  EXPECT_EQ(options.design(), (FieldDesign{1, 64, 256, 16384, "linear"}))
+      << "it states a part of the design";
+  const PrecomputeOptions known = options.in_force().with_st_nodes(1632);
+  EXPECT_EQ(known.design().st_nodes, 1632);
+  EXPECT_EQ(option_texts(to_toml(known)).count("st_spacing_mm"), 0U);
+  PrecomputeOptions counted;
+  counted.st_nodes = 1632;
+  EXPECT_EQ(deciding_options(known, kCastingStage), deciding_options(counted, kCastingStage));
+  options.budget.target_psnr_db = 50.0;
+  EXPECT_THAT(problems(options), Contains(HasSubstr("st_spacing_mm: a probe chooses the nodes")));
 }
 
 TEST(FieldDesignOfOptions, ABudgetDecidesNothingButTheDesign) {
