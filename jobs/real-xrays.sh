@@ -29,8 +29,8 @@ stop, run the same command again to continue. Needs the programs in build/releas
                             no finish                                                                            [1]
   --calibration OPTIONS     options of af-scan, in one word, e.g. "--as-stated" for a calibrated scanner
   --field OPTIONS           options of af-precompute, in one word, for the fields of all presets [--preset standard; robust, which
-                            is compared with ray casting, has --codewords 65536 and (s,t) nodes half a voxel apart, too:
-                            up to twenty times as large]
+                            is compared with ray casting, has --codewords 65536 and (s,t) nodes at most half a voxel apart, too,
+                            but never closer than 0.1 mm: 20 times as large for the cylinder of docs/real-xrays.md]
   --max-rotation-deg X      range of the fields, degrees                                                         [16]
   --max-translation-mm X    range of the fields, mm                                                              [40]
   --quick                   2 pairs, 1 start in each of 15 intervals, ray casting from 4 starts per case and preset
@@ -42,7 +42,7 @@ TEXT
 
 folder="" scan="" target="$PWD/real-xrays" pairs=5 presets=robust,fast,paper starts=8 intervals=15 raycast_starts=1
 raycast_intervals=15 scan_words="" max_rotation_deg=16 max_translation_mm=40 ranks=$(core_count) seed=1
-field_words="--preset standard" robust_field_words=""
+field_words="--preset standard" states_fields=no
 while (($# > 0)); do
   case "$1" in
     --scan) need_value "$1" $#; scan=$2; shift ;;
@@ -53,7 +53,7 @@ while (($# > 0)); do
     --intervals) need_value "$1" $#; need_count "$1" "$2"; intervals=$2; shift ;;
     --raycast-starts) need_value "$1" $#; need_seed "$1" "$2"; raycast_starts=$2; shift ;;
     --calibration) need_value "$1" $#; scan_words=$2; shift ;;
-    --field) need_value "$1" $#; field_words=$2 robust_field_words=$2; shift ;;
+    --field) need_value "$1" $#; field_words=$2 states_fields=yes; shift ;;
     --max-rotation-deg) need_value "$1" $#; max_rotation_deg=$2; shift ;;
     --max-translation-mm) need_value "$1" $#; max_translation_mm=$2; shift ;;
     --quick) pairs=2 starts=1 raycast_starts=1 raycast_intervals=4 ;;
@@ -101,10 +101,13 @@ stage "scan" "$study" "$bin/af-scan" --scan "$scan" --folder "$folder" --pairs "
   "${scan_options[@]}" --force -o "$output/study"
 water=$(sed -n 's/^water_mu_per_mm = //p' "$output/study/calibration.toml")
 [[ -n "$water" ]] || die 6 "$output/study/calibration.toml has no water_mu_per_mm"
-# Look-up loses what is finer than two voxels where nodes are a voxel apart, and then ends elsewhere than ray casting.
-half_voxel=$(sed -n 's/^ct_voxel_mm = //p' "$output/study/calibration.toml" | awk '{ printf "%.4f", $1 / 2 }')
-[[ -n "$half_voxel" ]] || die 6 "$output/study/calibration.toml has no ct_voxel_mm"
-robust_field_words=${robust_field_words:---preset standard --codewords 65536 --st-spacing-mm $half_voxel}
+robust_field_words=$field_words
+if [[ "$states_fields" == no ]]; then
+  # Where nodes are a voxel apart, look-up loses what is finer than two voxels, and ends elsewhere than ray casting.
+  half_voxel=$(awk '/^ct_voxel_mm = / { printf "%.4f", $3 < 0.2 ? 0.1 : $3 / 2 }' "$output/study/calibration.toml")
+  [[ -n "$half_voxel" ]] || die 6 "$output/study/calibration.toml has no ct_voxel_mm"
+  robust_field_words+=" --codewords 65536 --st-spacing-mm $half_voxel"
+fi
 stage_inputs="$(sha256sum <"$study") $(sha256sum <"$output/study/calibration.toml")"
 
 # --- fields, starts, registrations -------------------------------------------------------------------------------

@@ -166,17 +166,21 @@ LightSlab sized_planes(const FieldSource& source,
 int st_nodes_at_most_apart(const std::vector<FieldPart>& parts, double spacing_mm) {
   constexpr int kMultiple = 32;
   double longest_mm = 0.0;
+  int present = 0;
   for (const FieldPart& part : parts)
-    for (const SlabGeometry& slab : part.light_slab.slabs)
+    for (const SlabGeometry& slab : part.light_slab.slabs) {
       longest_mm = std::max({longest_mm, slab.s.length_mm(), slab.t.length_mm()});
+      present = std::max({present, slab.s.nodes, slab.t.nodes});
+    }
   const double nodes = std::ceil(longest_mm / spacing_mm) + 1.0;
+  if (nodes <= present) return present;
   if (!(nodes <= kMostPlaneNodes))
     throw InputError("--st-spacing-mm",
                      toml_number(spacing_mm),
-                     "the (s,t) planes are up to " + formatted("%.1f", longest_mm) +
-                         " mm wide and take at most " + std::to_string(kMostPlaneNodes) +
-                         " nodes, that is " +
-                         formatted("%.4g", longest_mm / (kMostPlaneNodes - 1)) + " mm or more");
+                     "an (s,t) plane is " + formatted("%.1f", longest_mm) + " mm wide and has " +
+                         std::to_string(kMostPlaneNodes) + " nodes at most, " +
+                         formatted("%.4g", 1.001 * longest_mm / (kMostPlaneNodes - 1)) +
+                         " mm apart");
   return (static_cast<int>(nodes) + kMultiple - 1) / kMultiple * kMultiple;
 }
 

@@ -38,8 +38,9 @@ LightSlab sized_planes(const FieldSource& source,
                        const MotionRange& range,
                        const DepthSlabs& depth_slabs);
 
-/// Fewest nodes, a multiple of 32 so that levels of the pyramid halve them evenly, that stand at
-/// most `spacing_mm` apart on every (s,t) plane of the parts. InputError beyond kMostPlaneNodes.
+/// The nodes of the parts' (s,t) planes where they stand at most `spacing_mm` apart on every one of
+/// them; otherwise the fewest that do, a multiple of 32, so that levels of the pyramid halve them
+/// evenly. InputError beyond kMostPlaneNodes.
 int st_nodes_at_most_apart(const std::vector<FieldPart>& parts, double spacing_mm);
 
 /// The slabs of all parts, those of the first part first.

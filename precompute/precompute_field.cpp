@@ -142,8 +142,13 @@ class PrecomputeRun {
   /// Collective. Where the options state a spacing, the nodes of the (s,t) planes that it takes.
   void space_nodes(const std::vector<DepthSlabs>& depth_slabs) {
     if (!options_.st_spacing_mm) return;
-    options_ = options_.with_st_nodes(all_or_none(
-        world_, [&] { return st_nodes_at_most_apart(parts_, *options_.st_spacing_mm); }));
+    const double spacing_mm = *options_.st_spacing_mm;
+    options_ = options_.with_st_nodes(
+        all_or_none(world_, [&] { return st_nodes_at_most_apart(parts_, spacing_mm); }));
+    inform(world_,
+           formatted("(s,t) nodes at most %g mm apart: %d along each side of every plane",
+                     spacing_mm,
+                     *options_.st_nodes));
     for (std::size_t i = 0; i < parts_.size(); ++i) size_planes(parts_[i], depth_slabs[i]);
     lattice_ = lattice_of(parts_);
   }

@@ -128,8 +128,9 @@ void describe_casting(Fields& field, PrecomputeOptions& options) {
       .decides(kCastingStage);
   field("st_spacing_mm",
         options.st_spacing_mm,
-        "Instead: as many nodes as let them stand at most so far apart on every (s,t) plane, mm. "
-        "Half the CT's voxel is as fine as its DRRs are")
+        "Instead of --st-nodes: nodes at most so far apart on every (s,t) plane, mm: those of the "
+        "preset, or as many more as that takes, in multiples of 32. Half the CT's voxel is as fine "
+        "as its DRRs are. Not with a probe")
       .above(0.0)
       .finite()
       .excludes({"--st-nodes", "--target-psnr-db", "--max-field-size", "--max-drr-ms"})
@@ -338,7 +339,7 @@ const DesignPreset& PrecomputeOptions::design_preset() const {
 }
 
 bool PrecomputeOptions::needs_probe() const {
-  if (slabs && uv_nodes && st_nodes && codewords) return false;
+  if (slabs && uv_nodes && (st_nodes || st_spacing_mm) && codewords) return false;
   return budget.is_stated() || design_preset().budget.is_stated();
 }
 
@@ -434,7 +435,7 @@ std::vector<std::string> problems(const PrecomputeOptions& options) {
   if (options.needs_probe() && options.st_spacing_mm)
     found.emplace_back(
         "st_spacing_mm: a probe chooses the nodes of the (s,t) planes; leave it out, or state "
-        "slabs, uv_nodes and codewords instead of a limit");
+        "slabs, uv_nodes and codewords, too");
   const FieldDesign design = options.design();
   if (!options.needs_probe() && design.fits_uv && design.uv_nodes < kFewestFittedViewpoints)
     found.push_back("uv_nodes = " + std::to_string(design.uv_nodes) + ": must be at least " +

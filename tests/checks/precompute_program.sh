@@ -80,25 +80,34 @@ done
 [[ -z $(find . -name '*.h5*') ]] || fail 'the dry run wrote a file'
 
 hash_of() { sed -n 's/.*sha256 //p' "$1"; }
-# Nodes by their spacing: just as many as let them stand no farther apart on any (s,t) plane, and the field is that of this count.
-spaced=("${common[@]:0:8}" --uv-nodes 9 --codewords 200 --training-fraction 0.5 --caster shear-warp)
+# Nodes by their spacing: those of the design, or just as many more as let them stand no farther apart on any (s,t) plane.
+spaced=("${common[@]:0:8}" --uv-nodes 9 --codewords 200 --training-fraction 0.5)
 expect 2 'excludes' "${spaced[@]}" --st-nodes 64 --st-spacing-mm 4 -o refused.h5
 expect 2 'excludes' "${spaced[@]}" --max-field-size 1MB --st-spacing-mm 4 -o refused.h5
+expect 3 'st_spacing_mm: a probe' "${spaced[@]}" --preset compact --st-spacing-mm 4 -o refused.h5
 expect 3 'st_spacing_mm = 0: must be' "${spaced[@]}" --st-spacing-mm 0 -o refused.h5
 expect 2 "st-spacing-mm: 'nan'" "${spaced[@]}" --st-spacing-mm nan -o refused.h5
-expect 3 'st-spacing-mm = 0.01: the (s,t) planes are up to .* take at most 4096 nodes' "${spaced[@]}" --st-spacing-mm 0.01 -o refused.h5
-widest() { sed -n 's/.*(s,t) plane.* nodes, \([0-9.]*\) x \([0-9.]*\) mm apart.*/\1\n\2/p' "$1" | sort -g | tail -1; }
-for slabs in 1 3; do
-  "$program" "${spaced[@]}" --slabs "$slabs" --st-spacing-mm 4 --dry-run >spaced-dry.txt
-  nodes=$(sed -n 's/.*(s,t) plane.* mm, \([0-9]*\) x .*/\1/p' spaced-dry.txt | sort -u)
-  [[ $(awk -v at="$(widest spaced-dry.txt)" 'BEGIN { print (at <= 4) }') == 1 ]] || fail "nodes too far apart: $(cat spaced-dry.txt)"
-  "$program" "${spaced[@]}" --slabs "$slabs" --st-nodes $((nodes - 32)) --dry-run >fewer-dry.txt
-  [[ $(awk -v at="$(widest fewer-dry.txt)" 'BEGIN { print (at > 4) }') == 1 ]] || fail "$nodes nodes: fewer would do: $(cat fewer-dry.txt)"
-  "$program" "${spaced[@]}" --slabs "$slabs" --st-spacing-mm 4 -o spaced.h5 >spaced.txt 2>/dev/null
-  "$program" "${spaced[@]}" --slabs "$slabs" --st-nodes "$nodes" -o counted.h5 >counted.txt 2>/dev/null
-  [[ -n $(hash_of spaced.txt) && $(hash_of spaced.txt) == "$(hash_of counted.txt)" ]] ||
-    fail "$slabs slabs: a spacing gives another field than its $nodes nodes"
+expect 3 'st-spacing-mm = 0.01: an (s,t) plane is .* has 4096 nodes at most' "${spaced[@]}" --st-spacing-mm 0.01 -o refused.h5
+"$program" "${spaced[@]}" --st-spacing-mm "$(sed -n 's/.* at most, \([0-9.]*\) mm apart.*/\1/p' err)" --dry-run >out 2>err ||
+  fail "the spacing that the error names is refused, too: $(cat err)"
+planes() { sed -n 's/.*(s,t) plane .* mm, \([0-9]*\) x [0-9]* nodes, \([0-9.]*\) x \([0-9.]*\) mm apart.*/\1 \2\n\1 \3/p' "$1"; }
+for caster in shear-warp trilinear; do
+  for slabs in 1 3; do
+    options=("${spaced[@]}" --caster "$caster" --slabs "$slabs")
+    "$program" "${options[@]}" --st-spacing-mm 1.2 --dry-run >spaced-dry.txt 2>/dev/null
+    nodes=$(planes spaced-dry.txt | awk 'NR == 1 { print $1 } $2 > 1.2 { exit 1 }') || fail "too far apart: $(cat spaced-dry.txt)"
+    ((nodes > 256 && nodes % 32 == 0)) || fail "$nodes nodes at most 1.2 mm apart: $(cat spaced-dry.txt)"
+    "$program" "${options[@]}" --st-nodes $((nodes - 32)) --dry-run >fewer-dry.txt
+    planes fewer-dry.txt | awk '$2 > 1.2 { found = 1 } END { exit !found }' || fail "fewer than $nodes would do: $(cat fewer-dry.txt)"
+    "$mpiexec" -n 2 "$program" "${options[@]}" --st-spacing-mm 1.2 -o spaced.h5 >spaced.txt 2>spaced.err
+    grep -q "at most 1.2 mm apart: $nodes along" spaced.err || fail "it did not say how many nodes that takes: $(cat spaced.err)"
+    "$program" "${options[@]}" --st-nodes "$nodes" -o counted.h5 >counted.txt 2>/dev/null
+    [[ -n $(hash_of spaced.txt) && $(hash_of spaced.txt) == "$(hash_of counted.txt)" ]] ||
+      fail "$caster, $slabs slabs: a spacing gives another field than its $nodes nodes"
+  done
 done
+"$program" "${spaced[@]}" --st-spacing-mm 50 --dry-run >out 2>/dev/null
+grep -q '256 x 256 nodes' out || fail "a wide spacing took nodes away: $(cat out)"
 
 # same_hash RANKS EXPECTED OPTIONS...
 same_hash() {

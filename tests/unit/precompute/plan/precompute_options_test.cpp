@@ -137,8 +137,13 @@ TEST(FieldDesignOfOptions, ASpacingStandsForNodesThatAreNotKnownYet) {
   PrecomputeOptions counted;
   counted.st_nodes = 1632;
   EXPECT_EQ(deciding_options(known, kCastingStage), deciding_options(counted, kCastingStage));
-  options.budget.target_psnr_db = 50.0;
+  options.preset = "fine";
   EXPECT_THAT(problems(options), Contains(HasSubstr("st_spacing_mm: a probe chooses the nodes")));
+  options.slabs = 8;
+  options.uv_nodes = 8;
+  options.codewords = 65536;
+  EXPECT_FALSE(options.needs_probe()) << "nothing is left to choose";
+  EXPECT_TRUE(problems(options).empty());
 }
 
 TEST(FieldDesignOfOptions, ABudgetDecidesNothingButTheDesign) {
