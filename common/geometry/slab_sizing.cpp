@@ -323,8 +323,7 @@ std::vector<PlaneExtent> extents_from(const CameraGeometry& camera,
 /// Fewest nodes of an axis, an even number and no more than it has, that stand no farther apart
 /// than those of `other`.
 int nodes_at_most_apart(const GridAxis& axis, const GridAxis& other) {
-  const double length = axis.last_mm - axis.first_mm;
-  const int intervals = static_cast<int>(std::ceil(length / other.spacing_mm()));
+  const int intervals = static_cast<int>(std::ceil(axis.length_mm() / other.spacing_mm()));
   return std::min(axis.nodes, std::max(2, (intervals + 2) / 2 * 2));
 }
 
