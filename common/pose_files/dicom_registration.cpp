@@ -60,25 +60,52 @@ std::string uids_of(const std::vector<RegisteredFrame>& frames) {
   });
 }
 
-/// The CT's among the frames.
-const RegisteredFrame& ct_frame(const std::vector<RegisteredFrame>& frames,
-                                const std::string& room_uid,
-                                const std::string& ct_uid,
-                                const std::string& file) {
-  std::vector<const RegisteredFrame*> others;
-  for (const RegisteredFrame& frame : frames) {
-    if (!ct_uid.empty() && frame.uid == ct_uid) return frame;
-    if (frame.uid != room_uid) others.push_back(&frame);
+/// The frames of a pose; null: the frame that the object registers to, if it does not list it.
+struct PoseFrames {
+  const RegisteredFrame* ct = nullptr;
+  const RegisteredFrame* room = nullptr;
+
+  [[nodiscard]] RigidTransform room_from_ct() const {
+    const auto matrix = [](const RegisteredFrame* frame) {
+      return frame == nullptr ? RigidTransform::Identity() : frame->registered_from_frame;
+    };
+    return matrix(room).inverse() * matrix(ct);
   }
-  // The object registers other frames to the CT's: no matrix of it is the CT's.
-  if (!ct_uid.empty() && ct_uid == room_uid)
-    throw InputError(file + ": its own frame of reference, the room's, is the CT's (" + ct_uid +
-                     "); it registers to it " + uids_of(frames) +
-                     ", none of which can be taken as the CT's");
-  if (others.empty() && frames.size() == 1) return frames.front();
-  if (others.size() == 1) return *others.front();
+};
+
+/// The object's own frame is the room's, or the CT's: then the only other one is the room's.
+PoseFrames pose_frames(const std::vector<RegisteredFrame>& frames,
+                       const std::string& own_uid,
+                       const std::string& ct_uid,
+                       const std::string& file) {
+  std::vector<const RegisteredFrame*> others;
+  const RegisteredFrame* own = nullptr;
+  const RegisteredFrame* ct = nullptr;
+  for (const RegisteredFrame& frame : frames) {
+    if (frame.uid == own_uid) own = &frame;
+    if (!ct_uid.empty() && frame.uid == ct_uid) ct = &frame;
+    if (frame.uid != own_uid && frame.uid != ct_uid) others.push_back(&frame);
+  }
+  if (!ct_uid.empty() && ct_uid == own_uid) {
+    if (others.size() > 1)
+      throw InputError(file + ": its own frame of reference is the CT's (" + ct_uid +
+                       "); which is the room's is not known: it has " + uids_of(frames));
+    return {ct, others.empty() ? nullptr : others.front()};
+  }
+  if (ct != nullptr) return {ct, own};
+  if (others.size() == 1) return {others.front(), own};
+  if (frames.size() == 1) return {own, nullptr};
   throw InputError(file + ": which frame of reference is the CT's is not known; it has " +
                    uids_of(frames));
+}
+
+/// Every frame once.
+void require_distinct(const std::vector<RegisteredFrame>& frames, const std::string& file) {
+  for (std::size_t i = 0; i < frames.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      if (frames[i].uid == frames[j].uid)
+        throw InputError(file + ": registers a frame of reference twice; it has " +
+                         uids_of(frames));
 }
 
 /// A UID of 120 bits of a hash (PS3.5, B.2), so that equal content has an equal UID.
@@ -157,21 +184,21 @@ PosesInFile read_dicom_registration(const PoseFileBytes& file, const PoseContext
                      object.text(kSopClassTag),
                      std::string("must be ") + kSopClass + ", a spatial registration",
                      name);
-  const std::string room_uid = object.text(kFrameOfReference);
+  const std::string own_uid = object.text(kFrameOfReference);
   std::vector<RegisteredFrame> frames;
   for (const DicomItem& item : object.items(kRegistrationSequence))
     frames.push_back(frame_of(item, name));
   if (frames.empty()) throw FileError(name, "has no registration (0070,0308)");
   const std::string ct_uid =
       context.ct_frame_of_reference ? context.ct_frame_of_reference() : std::string();
-  const RegisteredFrame& ct = ct_frame(frames, room_uid, ct_uid, name);
-  RigidTransform registered_from_room = RigidTransform::Identity();
-  for (const RegisteredFrame& frame : frames)
-    if (&frame != &ct && frame.uid == room_uid) registered_from_room = frame.registered_from_frame;
-  PosesInFile found{{{1, registered_from_room.inverse() * ct.registered_from_frame}}, {}};
-  if (!ct_uid.empty() && ct.uid != ct_uid)
-    found.notes.push_back(name + ": the frame of reference " + ct.uid +
-                          " is taken as the CT's, which is " + ct_uid);
+  require_distinct(frames, name);
+  const PoseFrames pose = pose_frames(frames, own_uid, ct_uid, name);
+  PosesInFile found{{{1, pose.room_from_ct()}}, {}};
+  if (ct_uid.empty() || (pose.ct != nullptr && pose.ct->uid != ct_uid))
+    found.notes.push_back(name + ": the frame of reference " + pose.ct->uid +
+                          " is taken as the CT's, " +
+                          (ct_uid.empty() ? "whose own is not known (--ct or --study states it)"
+                                          : "which is " + ct_uid));
   return found;
 }
 

@@ -383,6 +383,25 @@ TEST_F(OtherPoses, TheFixedFramesOwnMatrixIsTakenOff) {
   EXPECT_LT((pose * Vector3d(1, 0, 0) - Vector3d(-5, 8, 0)).norm(), kRoundingMm);
 }
 
+TEST_F(OtherPoses, OfARegistrationToTheCtTheRoomsMatrixIsInverted) {
+  const std::string identity = "1\\0\\0\\0\\0\\1\\0\\0\\0\\0\\1\\0\\0\\0\\0\\1";
+  // Room to CT: a quarter turn about z, then 7 mm along y.
+  const std::string turned = "0\\-1\\0\\0\\1\\0\\0\\7\\0\\0\\1\\0\\0\\0\\0\\1";
+  const std::array<std::string, 3> room = {"9.9", "RIGID", turned};
+  for (const auto& frames : std::vector<std::vector<std::array<std::string, 3>>>{
+           {{"1.2.3.4", "RIGID", identity}, room}, {room}}) {
+    const RigidTransform pose = read("r", registration("1.2.3.4", frames));
+    EXPECT_LT((pose * Vector3d(0, 8, 0) - Vector3d(1, 0, 0)).norm(), kRoundingMm);
+  }
+}
+
+TEST_F(OtherPoses, WithoutTheCtsFrameTheOneTakenForItIsNamed) {
+  const std::string identity = "1\\0\\0\\0\\0\\1\\0\\0\\0\\0\\1\\0\\0\\0\\0\\1";
+  const PosesInFile found = read_pose_file(
+      write("r", registration("1.1", {{"9.9", "RIGID", identity}, {"1.1", "RIGID", identity}})));
+  EXPECT_THAT(found.notes, testing::ElementsAre(AllOf(HasSubstr("9.9"), HasSubstr("--ct"))));
+}
+
 TEST_F(OtherPoses, RegistrationsThatAreNotOneRigidPoseAreRefused) {
   const std::string identity = "1\\0\\0\\0\\0\\1\\0\\0\\0\\0\\1\\0\\0\\0\\0\\1";
   EXPECT_THAT(
@@ -395,11 +414,19 @@ TEST_F(OtherPoses, RegistrationsThatAreNotOneRigidPoseAreRefused) {
   EXPECT_THROW(read("r", registration("1.1", {{"1.2.3.4", "RIGID", "2" + identity.substr(1)}})),
                InputError);
   EXPECT_THROW(read("r", registration("1.1", {})), FileError);
-  // The CT is what the object registers to: the matrix is another frame's.
-  EXPECT_THAT(message_of<InputError>([&] {
-                read("r", registration("1.2.3.4", {{"9.9", "RIGID", identity}}));
-              }),
-              AllOf(HasSubstr("1.2.3.4"), HasSubstr("9.9")));
+  // Registered to the CT, so that either may be the room.
+  EXPECT_THAT(
+      message_of<InputError>([&] {
+        read("r",
+             registration("1.2.3.4", {{"9.8", "RIGID", identity}, {"9.9", "RIGID", identity}}));
+      }),
+      AllOf(HasSubstr("1.2.3.4"), HasSubstr("9.8, 9.9")));
+  EXPECT_THAT(
+      message_of<InputError>([&] {
+        read("r",
+             registration("1.1", {{"1.2.3.4", "RIGID", identity}, {"1.2.3.4", "RIGID", identity}}));
+      }),
+      HasSubstr("twice"));
   EXPECT_NO_THROW(read("r", registration("1.2.3.4", {{"1.2.3.4", "RIGID", identity}})));
   // Of another CT: taken, and said.
   const PosesInFile found =
