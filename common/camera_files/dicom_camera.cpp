@@ -77,6 +77,7 @@ class DicomCamera {
       read_detector(1);
       for (const PositionerAngles& angles : all_angles()) add_camera(angles);
     }
+    note_unapplied_angles();
     stated_.isocenter_point = Eigen::Vector3d::Zero();
     return stated_;
   }
@@ -180,6 +181,20 @@ class DicomCamera {
       stated_.notes.push_back(file_ + ": PositionerIsocenterDetectorRotationAngle (0018,9465) = " +
                               number_text(*rotation) +
                               " degrees is not applied: the images may be turned in their plane");
+  }
+
+  /// Of the tags that are not read, those that tilt the detector or turn the patient.
+  void note_unapplied_angles() {
+    constexpr std::array<std::pair<DicomTag, const char*>, 4> kAngles = {
+        {{{0x0018, 0x1138}, "TableAngle (0018,1138)"},
+         {{0x0018, 0x1450}, "ColumnAngulation (0018,1450)"},
+         {{0x0018, 0x1530}, "DetectorPrimaryAngle (0018,1530)"},
+         {{0x0018, 0x1531}, "DetectorSecondaryAngle (0018,1531)"}}};
+    for (const auto& [tag, name] : kAngles)
+      if (const double angle_deg = elements_.number_or_none(tag, name).value_or(0.0);
+          angle_deg != 0.0)
+        stated_.notes.push_back(file_ + ": " + name + " = " + number_text(angle_deg) +
+                                " degrees is not applied");
   }
 
   [[nodiscard]] std::size_t frame_count() const {

@@ -3,11 +3,14 @@
 // fixed image is the X-ray, a slice of one voxel in the CT's physical space (LPS, mm), and its
 // Size, Spacing, Origin and Direction stand beside. Rays run from its pixels to the focal point.
 #include <algorithm>
+#include <array>
 #include <map>
 
 #include <Eigen/Dense>
 
 #include "base/error.h"
+#include "base/joined.h"
+#include "base/toml_text.h"
 #include "camera_files/camera_text.h"
 #include "camera_files/format_readers.h"
 
@@ -18,21 +21,69 @@ namespace {
 /// "(Key value value ...)" lines; comments begin with "//".
 class ElastixParameters {
  public:
+  static constexpr std::array kKnown = {"FocalPoint",
+                                        "Size",
+                                        "Index",
+                                        "Spacing",
+                                        "Origin",
+                                        "Direction",
+                                        "PreParameters",
+                                        "UseDirectionCosines",
+                                        "Transform",
+                                        "NumberOfParameters",
+                                        "TransformParameters",
+                                        "InitialTransformParametersFileName",
+                                        "InitialTransformParameterFileName",
+                                        "HowToCombineTransforms",
+                                        "CenterOfRotationPoint",
+                                        "ComputeZYX",
+                                        "FixedImageDimension",
+                                        "MovingImageDimension",
+                                        "FixedInternalImagePixelType",
+                                        "MovingInternalImagePixelType",
+                                        "ResampleInterpolator",
+                                        "FinalBSplineInterpolationOrder",
+                                        "Threshold",
+                                        "Resampler",
+                                        "DefaultPixelValue",
+                                        "ResultImageFormat",
+                                        "ResultImagePixelType",
+                                        "CompressResultImage"};
+
   explicit ElastixParameters(const CameraFile& file) : file_(file.name()) {
     for (const WordLine& line : word_lines(file.text)) {
-      if (line.text.starts_with("//") || !line.text.starts_with('(')) continue;
+      if (line.text.starts_with("//")) continue;
+      if (!line.text.starts_with('('))
+        throw FileError(place_of(line, file_),
+                        "'" + beginning_of(line.text, 60) + "' is no parameter in brackets");
       const std::size_t close = line.text.find(')');
       if (close == std::string_view::npos)
         throw FileError(place_of(line, file_), "truncated: a parameter is not closed");
       const std::string_view inside = line.text.substr(1, close - 1);
       const std::size_t space = std::min(inside.find_first_of(" \t"), inside.size());
       const auto values = word_lines(inside.substr(space));
-      values_[std::string(inside.substr(0, space))] = {
+      const std::string key(inside.substr(0, space));
+      const WordLine value = {
           line.number, line.text, values.empty() ? line_without_words() : values[0].words};
+      if (!values_.emplace(key, value).second)
+        throw InputError(place_of(line, file_) + ": (" + key + " ...) is there twice");
     }
   }
 
-  [[nodiscard]] bool has(const char* key) const { return values_.contains(key); }
+  /// Whether a parameter is that word, quoted.
+  [[nodiscard]] bool says(const char* key, std::string_view word) const {
+    const auto found = values_.find(key);
+    return found != values_.end() && found->second.words.size() == 1 &&
+           found->second.words.front() == word;
+  }
+
+  /// Parameters that are neither of the camera nor without meaning for it.
+  [[nodiscard]] std::vector<std::string> unknown() const {
+    std::vector<std::string> unknown;
+    for (const auto& [key, value] : values_)
+      if (std::ranges::find(kKnown, key) == kKnown.end()) unknown.push_back(key);
+    return unknown;
+  }
 
   [[nodiscard]] Eigen::VectorXd numbers(const char* key, Eigen::Index count) const {
     const auto found = values_.find(key);
@@ -74,6 +125,8 @@ StatedRig read_elastix(const CameraFile& file, const CameraFileOptions& /*option
   if (!parameters.is_zero("Index")) throw InputError(file.name() + ": Index must be 0 0 0");
   const Eigen::Vector3d spacing_mm = parameters.numbers("Spacing", 3);
   const Eigen::VectorXd direction = parameters.numbers("Direction", 9);
+  if (parameters.says("UseDirectionCosines", "\"false\""))
+    throw InputError(file.name() + ": UseDirectionCosines must be \"true\": Direction is read");
   if (!(spacing_mm.minCoeff() > 0.0)) throw InputError(file.name() + ": Spacing must be above 0");
   StatedRig stated;
   StatedCamera camera;
@@ -91,6 +144,11 @@ StatedRig read_elastix(const CameraFile& file, const CameraFileOptions& /*option
        }()))
     throw InputError(file.name() + ": " + problem);
   stated.cameras.push_back(camera);
+  if (!parameters.is_zero("TransformParameters"))
+    stated.notes.push_back(file.name() +
+                           ": TransformParameters are a pose of the CT and are not read");
+  if (const auto unknown = parameters.unknown(); !unknown.empty())
+    stated.notes.push_back(file.name() + ": not read: " + joined(unknown));
   return stated;
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "base/toml_text.h"
 #include "camera_files/camera_text.h"
 #include "camera_files/format_readers.h"
 #include "geometry/pinhole_camera.h"
@@ -28,10 +29,8 @@ class MayaCam2Sections {
  public:
   explicit MayaCam2Sections(const CameraFile& file) : file_(file), lines_(word_lines(file.text)) {}
 
-  /// `rows` lines of `columns` numbers behind the line `title`.
-  [[nodiscard]] Eigen::MatrixXd numbers(const char* title,
-                                        Eigen::Index rows,
-                                        Eigen::Index columns) const {
+  /// `rows` lines of `columns` numbers behind the line `title`, which are taken out.
+  Eigen::MatrixXd take(const char* title, Eigen::Index rows, Eigen::Index columns) {
     const auto at =
         std::ranges::find_if(lines_, [&](const WordLine& line) { return line.text == title; });
     if (at == lines_.end())
@@ -44,7 +43,15 @@ class MayaCam2Sections {
                             " lines of numbers");
       matrix.row(row) = numbers_of(at[row + 1], columns, file_.name()).transpose();
     }
+    lines_.erase(at, at + rows + 1);
     return matrix;
+  }
+
+  void refuse_the_rest() const {
+    if (!lines_.empty())
+      throw InputError(place_of(lines_.front(), file_.name()) + ": line",
+                       "'" + beginning_of(lines_.front().text, 60) + "'",
+                       "is not known in a MayaCam 2 file");
   }
 
  private:
@@ -61,12 +68,13 @@ bool is_mayacam2(const CameraFile& file) {
 
 /// (column, row, 1) ~ K (R x + t), as OpenCV has it: row 0 on top, integers are pixel centres.
 StatedRig read_mayacam2(const CameraFile& file, const CameraFileOptions& /*options*/) {
-  const MayaCam2Sections sections(file);
-  const Eigen::MatrixXd size = sections.numbers("image size", 1, 2);
+  MayaCam2Sections sections(file);
+  const Eigen::MatrixXd size = sections.take("image size", 1, 2);
   PinholeCamera pinhole;
-  pinhole.pixels_from_camera = sections.numbers("camera matrix", 3, 3);
-  pinhole.camera_from_room = sections.numbers("rotation", 3, 3);
-  pinhole.translation_mm = sections.numbers("translation", 3, 1);
+  pinhole.pixels_from_camera = sections.take("camera matrix", 3, 3);
+  pinhole.camera_from_room = sections.take("rotation", 3, 3);
+  pinhole.translation_mm = sections.take("translation", 3, 1);
+  sections.refuse_the_rest();
   return one_camera(camera_from_pinhole(
       file.name(), pinhole, 1.0, size_of(size.row(0).transpose(), file.name() + ": image size")));
 }

@@ -11,6 +11,8 @@
 #include <Eigen/Geometry>
 
 #include "base/error.h"
+#include "base/joined.h"
+#include "base/toml_text.h"
 #include "camera_files/camera_text.h"
 #include "camera_files/format_readers.h"
 #include "camera_files/opencv_yaml.h"
@@ -81,7 +83,7 @@ class OpenCvValues {
   explicit OpenCvValues(const CameraFile& file) : file_(file) {
     for (auto& [key, value] : parse_opencv_yaml(file.text, file.name())) {
       const PlainKey plain = plain_key(key);
-      values_.push_back({plain, key, value});
+      values_.push_back({plain, key, value, false});
       if (is_one_of(camera_matrix_names(), plain.name)) numbers_.insert(plain.number);
     }
   }
@@ -95,9 +97,8 @@ class OpenCvValues {
                                            const std::string& number,
                                            const char* what) const {
     if (numbers_.size() == 1) return required(names, number, what);
-    for (const Entry& entry : values_)
-      if (entry.plain.number == number && is_one_of(names, entry.plain.name)) return entry.value;
-    const bool is_stereo = find(names, "") != nullptr;
+    if (const YamlValue* const value = find_exactly(names, number); value != nullptr) return *value;
+    const bool is_stereo = find_exactly(names, "") != nullptr;
     throw InputError(file_.name() + ": " + names.front() + number + " is missing: " + what +
                      (is_stereo ? "; that without a number, of a stereo calibration, is relative "
                                   "to the first camera"
@@ -106,10 +107,8 @@ class OpenCvValues {
 
   /// The value of that camera, or the one that all cameras share.
   [[nodiscard]] const YamlValue* find(const KeyNames& names, const std::string& number) const {
-    for (const std::string& wanted : {number, std::string()})
-      for (const Entry& entry : values_)
-        if (entry.plain.number == wanted && is_one_of(names, entry.plain.name)) return &entry.value;
-    return nullptr;
+    const YamlValue* const own = find_exactly(names, number);
+    return own != nullptr ? own : find_exactly(names, "");
   }
 
   [[nodiscard]] const YamlValue& required(const KeyNames& names,
@@ -117,6 +116,14 @@ class OpenCvValues {
                                           const char* what) const {
     if (const YamlValue* const value = find(names, number); value != nullptr) return *value;
     throw InputError(file_.name() + ": " + names.front() + number + " is missing: " + what);
+  }
+
+  /// Keys of which no value was taken.
+  [[nodiscard]] std::vector<std::string> unread() const {
+    std::vector<std::string> keys;
+    for (const Entry& entry : values_)
+      if (!entry.is_taken) keys.push_back(beginning_of(entry.key, 60));
+    return keys;
   }
 
   /// A vector of that many numbers, stored as row, column or list.
@@ -140,7 +147,19 @@ class OpenCvValues {
     PlainKey plain;
     std::string key;
     YamlValue value;
+    mutable bool is_taken = false;
   };
+
+  [[nodiscard]] const YamlValue* find_exactly(const KeyNames& names,
+                                              const std::string& number) const {
+    for (const Entry& entry : values_) {
+      if (entry.plain.number != number || !is_one_of(names, entry.plain.name)) continue;
+      entry.is_taken = true;
+      return &entry.value;
+    }
+    return nullptr;
+  }
+
   const CameraFile& file_;
   std::vector<Entry> values_;
   std::set<std::string> numbers_;
@@ -181,6 +200,11 @@ LensDistortion read_distortion_of(const OpenCvValues& values,
                                   const std::string& number,
                                   const Eigen::Matrix3d& k) {
   LensDistortion distortion;
+  const YamlValue* const model = values.find({"distortionmodel"}, number);
+  if (model != nullptr && model->text != "plumb_bob" && model->text != "rational_polynomial")
+    throw InputError(values.place(*model) + ": distortion_model",
+                     "'" + beginning_of(model->text, 60) + "'",
+                     "must be plumb_bob or rational_polynomial");
   const YamlValue* const stated = values.find(distortion_names(), number);
   if (stated == nullptr || stated->numbers.size() == 0) return distortion;
   const Eigen::VectorXd numbers = stated->numbers.transpose().reshaped();
@@ -257,6 +281,8 @@ StatedRig read_opencv_yaml(const CameraFile& file, const CameraFileOptions& /*op
     stated.cameras.push_back(read_camera(values, number));
   if (const YamlValue* const point = values.find({"isocenterpoint"}, ""); point != nullptr)
     stated.isocenter_point = Eigen::Vector3d(values.vector(*point, 3, "isocenter_point"));
+  if (const auto unread = values.unread(); !unread.empty())
+    stated.notes.push_back(file.name() + ": not read: " + joined(unread));
   return stated;
 }
 

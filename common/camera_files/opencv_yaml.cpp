@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "base/error.h"
+#include "base/toml_text.h"
 #include "camera_files/camera_file.h"
 
 namespace af {
@@ -80,6 +81,8 @@ class YamlParser {
       return;
     if (is_block_item(line)) return take_item(item_text(line));
     const auto pair = key_and_value(line);
+    if (!pair && !is_indented)
+      throw FileError(place(number), "'" + beginning_of(line, 60) + "' is no 'key: value'");
     if (!pair) return;
     if (!is_indented) {
       finish();

@@ -7,11 +7,13 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 
 #include <Eigen/Dense>
 
 #include "base/error.h"
 #include "base/number_text.h"
+#include "base/toml_text.h"
 #include "camera_files/camera_text.h"
 #include "camera_files/format_readers.h"
 #include "geometry/pinhole_camera.h"
@@ -31,6 +33,10 @@ class ProjectionFile {
     lines_ = word_lines(file.text);
     if (lines_.size() < kProjectionLines)
       throw FileError(file_, "truncated: a projection file has 16 lines");
+    if (lines_.size() > kProjectionLines)
+      throw InputError(place_of(lines_[kProjectionLines], file_) + ": line",
+                       "'" + beginning_of(lines_[kProjectionLines].text, 60) + "'",
+                       "must not be there: a projection file has 16 lines");
     if (lines_[kExtrinsicLine - 1].text != "Extrinsic" ||
         lines_[kIntrinsicLine - 1].text != "Intrinsic")
       throw FileError(file_, "the lines 'Extrinsic' and 'Intrinsic' are not where they belong");
@@ -83,7 +89,18 @@ class DrrCommand {
     }
   }
 
-  [[nodiscard]] bool has(const char* name) const { return values_.contains(name); }
+  /// All but what decides no camera: the image's values, its files, how it is computed.
+  void refuse_other_than(const std::set<std::string>& known) const {
+    static const std::set<std::string> indifferent = {
+        "-A", "--threading",       "--autoscale", "--autoscale-range", "-e", "--exponential",
+        "-G", "--geometry-only",   "-H",          "--hu-conversion",   "-I", "--input",
+        "-i", "--algorithm",       "-O",          "--output",          "-P", "--preprocess",
+        "-s", "--intensity-scale", "-t",          "--output-format"};
+    for (const auto& [name, value] : values_)
+      if (!known.contains(name) && !indifferent.contains(name))
+        throw InputError(file_ + ": " + beginning_of(name, 40) +
+                         " is not read: the projection files that plastimatch drr -G writes are");
+  }
 
   [[nodiscard]] Eigen::VectorXd numbers(const char* name,
                                         Eigen::Index count,
@@ -252,10 +269,14 @@ bool is_plastimatch_command(const CameraFile& file) {
 
 StatedRig read_plastimatch_command(const CameraFile& file, const CameraFileOptions& /*options*/) {
   const DrrCommand command(file);
-  for (const char* name : {"--gantry-angle", "--num-angles", "--subwindow"})
-    if (command.has(name))
-      throw InputError(file.name() + ": " + name +
-                       " is not read: the projection files that plastimatch drr -G writes are");
+  command.refuse_other_than({"--nrm",
+                             "--vup",
+                             "--sad",
+                             "--sid",
+                             "--dim",
+                             "--detector-size",
+                             "--image-center",
+                             "--isocenter"});
   using Eigen::Vector2d;
   using Eigen::Vector3d;
   const auto default_distance = [](double mm) { return Eigen::VectorXd::Constant(1, mm); };

@@ -3,12 +3,15 @@
 // pixel spacing, where the source is, and TPosition, which takes the detector's frame to the world
 // (mm): origin at the centre of pixel (0, 0), x along columns, y along rows, z towards the source.
 #include <algorithm>
+#include <array>
 #include <optional>
 
 #include <Eigen/Dense>
 
 #include "base/error.h"
+#include "base/joined.h"
 #include "base/number_text.h"
+#include "base/toml_text.h"
 #include "camera_files/camera_text.h"
 #include "camera_files/format_readers.h"
 #include "geometry/rigid_transform.h"
@@ -21,6 +24,8 @@ constexpr std::string_view kRadSize = "Size[pixels]:";
 constexpr std::string_view kRadStep = "Step[mm]:";
 constexpr std::string_view kRadSource = "SourcePosition[mm]:";
 constexpr std::string_view kRadPosition = "TPosition:";
+constexpr std::array kRadKeys = {
+    kRadSize, kRadStep, kRadSource, kRadPosition, std::string_view("DataType:")};
 
 /// The lines of a .rad file.
 class RadHeader {
@@ -46,6 +51,18 @@ class RadHeader {
           numbers_of(lines_[first + static_cast<std::size_t>(row)], 4, file_).transpose();
     throw_if_any(rigidity_problems(matrix), file_ + ": TPosition");
     return rigid_from_matrix(matrix);
+  }
+
+  /// Keys that the camera does not need, and lines without one.
+  [[nodiscard]] std::vector<std::string> unread() const {
+    const auto matrix = static_cast<std::size_t>(&line_of(kRadPosition) - lines_.data());
+    std::vector<std::string> unread;
+    for (std::size_t i = 0; i < lines_.size(); ++i)
+      if ((i <= matrix || i > matrix + 4) &&
+          std::ranges::none_of(
+              kRadKeys, [&](std::string_view key) { return lines_[i].text.starts_with(key); }))
+        unread.push_back(beginning_of(lines_[i].text.substr(0, lines_[i].text.find(':')), 60));
+    return unread;
   }
 
  private:
@@ -89,6 +106,8 @@ StatedRig read_rad_header(const CameraFile& file, const CameraFileOptions& /*opt
                      ": the z axis of TPosition must point from the detector to the source");
   StatedRig rig;
   rig.cameras.push_back(stated);
+  if (const auto unread = header.unread(); !unread.empty())
+    rig.notes.push_back(file.name() + ": not read: " + joined(unread));
   return rig;
 }
 

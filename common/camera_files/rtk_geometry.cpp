@@ -10,6 +10,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <strings.h>
 
 #include <Eigen/Geometry>
 
@@ -27,6 +28,7 @@ namespace {
 constexpr const char* kRoot = "RTKThreeDCircularGeometry";
 constexpr std::size_t kMostProjections = 100000;
 
+/// Those of collimators do not matter to where pixels see.
 constexpr std::array kKnownNumbers = {"SourceToIsocenterDistance",
                                       "SourceToDetectorDistance",
                                       "GantryAngle",
@@ -36,15 +38,40 @@ constexpr std::array kKnownNumbers = {"SourceToIsocenterDistance",
                                       "SourceOffsetY",
                                       "ProjectionOffsetX",
                                       "ProjectionOffsetY",
-                                      "RadiusCylindricalDetector"};
+                                      "RadiusCylindricalDetector",
+                                      "CollimationUInf",
+                                      "CollimationUSup",
+                                      "CollimationVInf",
+                                      "CollimationVSup"};
 
-/// Parameters by name. Others, of collimators, do not matter to where pixels see.
+/// Parameters by name.
 using RtkValues = std::map<std::string, double>;
 
+/// As RTK compares names.
+bool is_named(const XmlElement& element, const char* name) {
+  return strcasecmp(element.name.c_str(), name) == 0;
+}
+
+std::string place_of(const XmlElement& element, const std::string& file) {
+  return file + ":" + std::to_string(element.line);
+}
+
+[[noreturn]] void refuse(const XmlElement& element, const std::string& file) {
+  throw InputError("element",
+                   "<" + beginning_of(element.name, 100) + ">",
+                   "is not known at this place of RTK's geometry",
+                   place_of(element, file));
+}
+
+/// RTK takes Angle for GantryAngle.
 void take_number(const XmlElement& element, const std::string& file, RtkValues& values) {
-  if (std::ranges::find(kKnownNumbers, element.name) == kKnownNumbers.end()) return;
-  values[element.name] = number_of(trimmed_view(element.text),
-                                   file + ":" + std::to_string(element.line) + ": " + element.name);
+  const auto* const known = std::ranges::find_if(
+      kKnownNumbers, [&](const char* name) { return is_named(element, name); });
+  const bool is_angle = is_named(element, "Angle");
+  if (!is_angle && known == kKnownNumbers.end()) refuse(element, file);
+  if (!element.children.empty()) refuse(element.children.front(), file);
+  values[is_angle ? "GantryAngle" : *known] =
+      number_of(trimmed_view(element.text), place_of(element, file) + ": " + element.name);
 }
 
 double value_of(const RtkValues& values, const char* name) {
@@ -98,7 +125,7 @@ CameraGeometry camera_of(const RtkValues& values, const std::string& place) {
 void check_matrix(const XmlElement& element,
                   const CameraGeometry& camera,
                   const std::string& file) {
-  const std::string place = file + ":" + std::to_string(element.line) + ": Matrix";
+  const std::string place = place_of(element, file) + ": Matrix";
   Eigen::Matrix<double, 3, 4> matrix;
   Eigen::Index count = 0;
   for (const WordLine& line : word_lines(element.text))
@@ -118,18 +145,31 @@ void check_matrix(const XmlElement& element,
   }
 }
 
+/// `values` are what stands before the projection, in other projections too, and hold for the next.
 StatedCamera read_projection(const XmlElement& projection,
-                             const RtkValues& common,
-                             const std::string& file) {
-  RtkValues values = common;
-  for (const XmlElement& element : projection.children) take_number(element, file, values);
+                             const std::string& file,
+                             RtkValues& values) {
+  const XmlElement* matrix = nullptr;
+  for (const XmlElement& element : projection.children)
+    if (is_named(element, "Matrix"))
+      matrix = &element;
+    else
+      take_number(element, file, values);
   StatedCamera stated;
-  stated.geometry = camera_of(values, file + ":" + std::to_string(projection.line));
+  stated.geometry = camera_of(values, place_of(projection, file));
   stated.has_size = false;
   stated.has_pixel_grid = false;
-  if (const XmlElement* const matrix = projection.child("Matrix"); matrix != nullptr)
-    check_matrix(*matrix, stated.geometry, file);
+  if (matrix != nullptr) check_matrix(*matrix, stated.geometry, file);
   return stated;
+}
+
+/// RTK refuses all others, and files without one.
+void check_version(const XmlElement& root, const std::string& file) {
+  const auto found = root.attributes.find("version");
+  const std::string version = found == root.attributes.end() ? "" : found->second;
+  if (version != "2" && version != "3")
+    throw InputError(
+        "version", "'" + beginning_of(version, 20) + "'", "must be 2 or 3", place_of(root, file));
 }
 
 /// The angles whose Rz(-in plane) Rx(-out of plane) Ry(-gantry) has the rows `axes`, degrees.
@@ -167,14 +207,15 @@ StatedRig read_rtk_geometry(const CameraFile& file, const CameraFileOptions& /*o
   const XmlElement root = parse_xml(file.text, file.name());
   if (root.name != kRoot)
     throw FileError(file.name(), "root element", kRoot, beginning_of(root.name, 100));
+  check_version(root, file.name());
   StatedRig stated;
   stated.isocenter_point = Eigen::Vector3d::Zero();
-  RtkValues common;  // what stands outside holds for the projections behind it
+  RtkValues values;
   for (const XmlElement& element : root.children) {
-    if (element.name == "Projection")
-      stated.cameras.push_back(read_projection(element, common, file.name()));
+    if (is_named(element, "Projection"))
+      stated.cameras.push_back(read_projection(element, file.name(), values));
     else
-      take_number(element, file.name(), common);
+      take_number(element, file.name(), values);
     if (stated.cameras.size() > kMostProjections)
       throw InputError(file.name() + ": more than 100000 projections are too many cameras");
   }

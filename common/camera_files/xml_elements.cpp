@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "camera_files/xml_elements.h"
 
-#include <algorithm>
 #include <expat.h>
 #include <memory>
 
@@ -32,11 +31,13 @@ XmlBuilder& builder(void* data) {
   return *static_cast<XmlBuilder*>(data);
 }
 
-void XMLCALL begin_element(void* data, const XML_Char* name, const XML_Char** /*attributes*/) {
+void XMLCALL begin_element(void* data, const XML_Char* name, const XML_Char** attributes) {
   XmlBuilder& xml = builder(data);
   if (++xml.count > kMostElements) return xml.stop("more than a million elements");
   if (xml.open.size() == kDeepest) return xml.stop("elements are nested too deeply");
-  xml.open.push_back({name, XML_GetCurrentLineNumber(xml.parser), "", {}});
+  xml.open.push_back({name, XML_GetCurrentLineNumber(xml.parser), {}, "", {}});
+  for (; *attributes != nullptr; attributes += 2)
+    xml.open.back().attributes.emplace(attributes[0], attributes[1]);
 }
 
 void XMLCALL end_element(void* data, const XML_Char* /*name*/) {
@@ -64,11 +65,6 @@ void XMLCALL refuse_entity(void* data,
 }
 
 }  // namespace
-
-const XmlElement* XmlElement::child(std::string_view child_name) const {
-  const auto found = std::ranges::find(children, child_name, &XmlElement::name);
-  return found == children.end() ? nullptr : &*found;
-}
 
 XmlElement parse_xml(const std::string& text, const std::string& file) {
   const std::unique_ptr<XML_ParserStruct, decltype(&XML_ParserFree)> parser(

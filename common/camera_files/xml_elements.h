@@ -2,8 +2,8 @@
 #pragma once
 
 #include <cstddef>
+#include <map>
 #include <string>
-#include <string_view>
 #include <vector>
 
 namespace af {
@@ -12,14 +12,12 @@ namespace af {
 struct XmlElement {
   std::string name;
   std::size_t line = 0;
+  std::map<std::string, std::string> attributes;
   std::string text;
   std::vector<XmlElement> children;
-
-  /// The first child of that name, or nullptr.
-  [[nodiscard]] const XmlElement* child(std::string_view child_name) const;
 };
 
-/// The root element (expat). Attributes are left out. FileError "FILE:LINE: ..." when the text is
+/// The root element (expat). FileError "FILE:LINE: ..." when the text is
 /// no XML, and for elements nested deeper than 32, a million elements or entities of its own.
 XmlElement parse_xml(const std::string& text, const std::string& file);
 

@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "base/joined.h"
 #include "base/named_rows.h"
 #include "base/number_text.h"
 #include "camera_files/format_readers.h"
@@ -81,7 +82,8 @@ class XRegGroup {
   XRegGroup(const Hdf5Input& file, std::string group, std::string spacing_prefix)
       : file_(file), group_(std::move(group)), spacing_prefix_(std::move(spacing_prefix)) {}
 
-  [[nodiscard]] StatedCamera camera() const {
+  /// `notes` get what of the group is not read.
+  [[nodiscard]] StatedCamera camera(std::vector<std::string>& notes) const {
     XRegValues values;
     values.intrinsic = matrix<3>("intrinsic");
     values.extrinsic = matrix<4>("extrinsic");
@@ -99,6 +101,20 @@ class XRegGroup {
     stated.geometry =
         camera_from_pinhole(name, pinhole_of_xreg(values), values.spacing_mm.x(), values.size_px);
     check_row_spacing(stated.geometry, values.spacing_mm.y());
+    const std::vector<std::string> known = {"intrinsic",
+                                            "extrinsic",
+                                            "num-cols",
+                                            "num-rows",
+                                            spacing_prefix_ + "col-spacing",
+                                            spacing_prefix_ + "row-spacing",
+                                            kFrameType,
+                                            kXRegCameraName,
+                                            kXRegIsocenter + 1};
+    std::vector<std::string> unread = file_.names_in(group_.empty() ? "/" : group_);
+    std::erase_if(unread, [&](const std::string& dataset) {
+      return std::ranges::find(known, dataset) != known.end();
+    });
+    if (!unread.empty()) notes.push_back(path(joined(unread)) + ": not read");
     return stated;
   }
 
@@ -165,13 +181,14 @@ std::size_t count_of_projections(const Hdf5Input& file) {
 StatedRig rig_in(const Hdf5Input& hdf5) {
   StatedRig stated;
   if (hdf5.holds(kDeepFluoroGroup)) {
-    stated.cameras.push_back(XRegGroup(hdf5, kDeepFluoroGroup, "pixel-").camera());
+    stated.cameras.push_back(XRegGroup(hdf5, kDeepFluoroGroup, "pixel-").camera(stated.notes));
   } else if (hdf5.holds(kCountOfProjections)) {
     const std::size_t count = count_of_projections(hdf5);
     for (std::size_t i = 0; i < count; ++i)
-      stated.cameras.push_back(XRegGroup(hdf5, projection_group(i) + "/cam", "").camera());
+      stated.cameras.push_back(
+          XRegGroup(hdf5, projection_group(i) + "/cam", "").camera(stated.notes));
   } else {
-    stated.cameras.push_back(XRegGroup(hdf5, "", "").camera());
+    stated.cameras.push_back(XRegGroup(hdf5, "", "").camera(stated.notes));
   }
   if (hdf5.holds(kXRegIsocenter)) {
     const Hdf5Numbers point = hdf5.numbers(kXRegIsocenter, 3);

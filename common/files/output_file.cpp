@@ -201,6 +201,7 @@ void move_into_place(const fs::path& partial, const fs::path& path) {
 struct TextParts::File {
   Descriptor descriptor;
   std::vector<char> buffer = std::vector<char>(std::size_t{64} << 10);
+  bool is_begun = false;
 };
 
 TextParts::TextParts(const std::filesystem::path& path)
@@ -212,7 +213,10 @@ TextParts::TextParts(const std::filesystem::path& path)
 TextParts::~TextParts() = default;
 
 std::string_view TextParts::next() {
-  return {file_->buffer.data(), file_->descriptor.read(file_->buffer)};
+  std::string_view part{file_->buffer.data(), file_->descriptor.read(file_->buffer)};
+  if (!std::exchange(file_->is_begun, true) && part.starts_with(kByteOrderMark))
+    part.remove_prefix(kByteOrderMark.size());
+  return part;
 }
 
 std::string read_text_file(const std::filesystem::path& path, std::size_t max_bytes) {

@@ -47,6 +47,9 @@ void sync_path(const std::filesystem::path& path);
 /// has that name must not be replaced, see check_output_file().
 void move_into_place(const std::filesystem::path& partial, const std::filesystem::path& path);
 
+/// Windows begins texts in UTF-8 with it; it is no part of a text that is read here.
+inline constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+
 /// A file's text from its beginning, for files of any length. FileError when unreadable.
 class TextParts {
  public:

@@ -269,6 +269,28 @@ bool Hdf5Input::holds(const std::string& path) const {
   }
 }
 
+std::vector<std::string> Hdf5Input::names_in(const std::string& group) const {
+  std::vector<std::string> names;
+  const auto add = [](hid_t, const char* name, const H5L_info_t*, void* list) -> herr_t {
+    constexpr std::size_t kMost = 1000;
+    auto& found = *static_cast<std::vector<std::string>*>(list);
+    found.emplace_back(name);
+    return found.size() < kMost ? 0 : 1;
+  };
+  quietly(name_, [&] {
+    return hdf5::checked(H5Literate_by_name(state_->file,
+                                            group.c_str(),
+                                            H5_INDEX_NAME,
+                                            H5_ITER_INC,
+                                            nullptr,
+                                            add,
+                                            &names,
+                                            H5P_DEFAULT),
+                         "H5Literate_by_name");
+  });
+  return names;
+}
+
 Hdf5Numbers Hdf5Input::numbers(const std::string& path, std::size_t most) const {
   return quietly(name_, [&] {
     const std::string where = name_ + ": " + path;

@@ -41,6 +41,8 @@ class Hdf5Input {
   [[nodiscard]] const std::string& name() const { return name_; }
   /// Whether there is a link of that path ("/group/dataset"), whatever it leads to.
   [[nodiscard]] bool holds(const std::string& path) const;
+  /// The names of what a group that has been read from holds, at most 1000.
+  [[nodiscard]] std::vector<std::string> names_in(const std::string& group) const;
   /// At most `most` finite numbers of at most two extents, whole ones or not.
   [[nodiscard]] Hdf5Numbers numbers(const std::string& path, std::size_t most) const;
   /// One text of at most 256 bytes, of variable length or of a fixed one.

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // ITK's transforms in HDF5 (itk::HDF5TransformIO): a group of each transform, whose datasets are
 // its type and its two lists of numbers. Files are read from and written to memory.
+#include <algorithm>
+#include <array>
+
 #include "base/error.h"
 #include "hdf5_files/hdf5_input.h"
 #include "hdf5_files/hdf5_output.h"
@@ -29,6 +32,10 @@ ItkTransform transform_in(const Hdf5Input& file) {
     throw FileError(file.name(), std::string("has no ") + kTransform + ": not an ITK transform");
   if (file.holds("/TransformGroup/1"))
     throw InputError(file.name() + ": holds several transforms (a composite one); one is expected");
+  constexpr std::array kKnown = {kTypeName, kParameters, kParametersOfItk4, kFixed, kFixedOfItk4};
+  for (const std::string& name : file.names_in(kTransform))
+    if (std::ranges::find(kKnown, std::string(kTransform) + "/" + name) == kKnown.end())
+      throw InputError(file.name() + ": " + kTransform, name, "is not known in a transform");
   return {file.text(kTypeName),
           list_in(file, kParameters, kParametersOfItk4),
           list_in(file, kFixed, kFixedOfItk4)};

@@ -85,6 +85,8 @@ constexpr std::array kItkTypes = {
     ItkType{"TranslationTransform", 3, true, 0, 0, no_rotation},
 };
 
+constexpr std::array kItkFields = {"Transform", "Parameters", "FixedParameters"};
+
 /// The "Key: value" lines of the one transform in an ITK transform text.
 std::map<std::string, std::string> itk_fields(const std::string& text, const std::string& file) {
   std::map<std::string, std::string> fields;
@@ -93,11 +95,15 @@ std::map<std::string, std::string> itk_fields(const std::string& text, const std
     const std::size_t colon = line.find(':');
     if (colon == std::string::npos)
       throw FileError(file, "line '" + beginning_of(line, 40) + "' has no colon");
+    if (std::ranges::find(kItkFields, line.substr(0, colon)) == kItkFields.end())
+      throw InputError(file + ": field",
+                       "'" + beginning_of(line.substr(0, colon), 40) + "'",
+                       "must be one of " + joined(kItkFields));
     if (!fields.emplace(line.substr(0, colon), line.substr(colon + 1)).second)
       throw FileError(file,
                       "'" + line.substr(0, colon) + "' is repeated; one transform is expected");
   }
-  for (const char* key : {"Transform", "Parameters", "FixedParameters"})
+  for (const char* key : kItkFields)
     if (fields.count(key) == 0) throw FileError(file, std::string("has no '") + key + ":' line");
   return fields;
 }

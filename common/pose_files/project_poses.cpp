@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "base/error.h"
+#include "base/joined.h"
 #include "base/number_text.h"
 #include "pose_files/pose_file.h"
 #include "text/csv_table.h"
@@ -34,10 +35,18 @@ RigidTransform pose_of_plain_numbers(const std::string& text, const std::string&
       Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(numbers.data()), file);
 }
 
-RigidTransform pose_of_json(const std::string& text, const std::string& file) {
-  const nlohmann::json json = json_of_text(text, file);
-  if (!json.contains(kPoseKey)) throw InputError(file + ": has no \"" + kPoseKey + "\"");
-  return pose_of_rows(json[kPoseKey], file + ": " + kPoseKey);
+/// What of a file is not read; no note for an empty list.
+std::vector<std::string> notes_on(const std::vector<std::string>& unread, const std::string& file) {
+  if (unread.empty()) return {};
+  return {file + ": not read: " + joined(unread)};
+}
+
+/// A file without a format, as result.json states it, is not this project's.
+std::vector<std::string> unread_keys(const nlohmann::json& json) {
+  std::vector<std::string> unread;
+  for (const auto& [key, value] : json.items())
+    if (key != kPoseKey && !json.contains("format")) unread.push_back(key);
+  return unread;
 }
 
 RigidTransform pose_of_toml(const std::string& text, const std::string& file) {
@@ -45,6 +54,7 @@ RigidTransform pose_of_toml(const std::string& text, const std::string& file) {
   TomlProblems problems(file);
   TomlTableReader reader(table, "", problems);
   const auto pose = reader.get_pose(kPoseKey, Presence::Required);
+  reader.refuse_unknown_keys();
   problems.throw_if_any();
   check(pose.has_value(), "a pose without problems must be there");
   return *pose;
@@ -54,11 +64,25 @@ std::string matrix_column(int row, int column) {
   return "m" + std::to_string(row) + std::to_string(column);
 }
 
-bool has_matrix_columns(const CsvTable& table, int rows) {
+std::vector<std::string> matrix_columns(int rows) {
+  std::vector<std::string> columns;
   for (int row = 0; row < rows; ++row)
-    for (int column = 0; column < 4; ++column)
-      if (!table.find_column(matrix_column(row, column))) return false;
-  return true;
+    for (int column = 0; column < 4; ++column) columns.push_back(matrix_column(row, column));
+  return columns;
+}
+
+bool has_matrix_columns(const CsvTable& table, int rows) {
+  return std::ranges::all_of(matrix_columns(rows), [&](const std::string& column) {
+    return table.find_column(column).has_value();
+  });
+}
+
+std::vector<std::string> unread_columns(const CsvTable& table,
+                                        const std::vector<std::string>& read) {
+  std::vector<std::string> unread;
+  for (const std::string& column : table.columns())
+    if (std::ranges::find(read, column) == read.end()) unread.push_back(column);
+  return unread;
 }
 
 RigidTransform matrix_of_row(const CsvTable& table, std::size_t row, int matrix_rows) {
@@ -124,7 +148,11 @@ bool is_json_pose(const PoseFileBytes& file) {
 }
 
 PosesInFile read_json_pose(const PoseFileBytes& file, const PoseContext& /*context*/) {
-  return {{{1, pose_of_json(file.bytes, file.path.string())}}, {}};
+  const std::string name = file.path.string();
+  const nlohmann::json json = json_of_text(file.bytes, name);
+  if (!json.contains(kPoseKey)) throw InputError(name + ": has no \"" + kPoseKey + "\"");
+  return {{{1, pose_of_rows(json[kPoseKey], name + ": " + kPoseKey)}},
+          notes_on(unread_keys(json), name)};
 }
 
 bool is_toml_pose(const PoseFileBytes& file) {
@@ -182,7 +210,10 @@ PosesInFile read_csv_of_poses(const PoseFileBytes& file, const PoseContext& cont
                        ": rx_deg ... tz_mm are relative to a nominal pose, which is not known "
                        "here; give m00 ... m23 (room_from_ct) instead");
   }
-  PosesInFile found;
+  const std::vector<std::string> read =
+      has_matrix ? matrix_columns(matrix_rows)
+                 : std::vector<std::string>(kParameterNames.begin(), kParameterNames.end());
+  PosesInFile found{{}, notes_on(unread_columns(table, read), name)};
   found.poses.reserve(table.row_count());
   for (std::size_t row = 0; row < table.row_count(); ++row)
     found.poses.push_back({static_cast<std::int64_t>(row + 1),
@@ -193,10 +224,7 @@ PosesInFile read_csv_of_poses(const PoseFileBytes& file, const PoseContext& cont
 
 std::string write_csv_of_poses(std::span<const RigidTransform> room_from_ct,
                                const PoseContext& /*context*/) {
-  std::vector<std::string> columns;
-  for (int row = 0; row < 3; ++row)
-    for (int column = 0; column < 4; ++column) columns.push_back(matrix_column(row, column));
-  CsvTable table(columns);
+  CsvTable table(matrix_columns(3));
   for (const RigidTransform& pose : room_from_ct) {
     std::vector<std::string> cells;
     for (int row = 0; row < 3; ++row)

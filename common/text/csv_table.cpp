@@ -19,7 +19,6 @@ namespace af {
 
 namespace {
 
-constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 constexpr std::size_t kRowsPerPart = 4096;
 
 struct Record {
@@ -28,7 +27,7 @@ struct Record {
 };
 
 std::string quoted_if_needed(const std::string& field) {
-  if (field.find_first_of(",\"\r\n") == std::string::npos && !field.starts_with(kByteOrderMark))
+  if (field.find_first_of(",;\"\r\n") == std::string::npos && !field.starts_with(kByteOrderMark))
     return field;
   std::string quoted = "\"";
   for (const char character : field) {
@@ -60,14 +59,19 @@ std::string_view trimmed(std::string_view text) {
 
 }  // namespace
 
-/// Splits CSV text into records (RFC 4180; LF or CRLF).
+/// Splits CSV text into records (RFC 4180; LF or CRLF). Excel writes semicolons between fields
+/// where numbers have decimal commas.
 class CsvTable::Parser {
  public:
   /// `next_part` gives the text in parts, and an empty one at its end.
   Parser(std::function<std::string_view()> next_part, const std::string& path)
       : next_part_(std::move(next_part)), path_(path), part_(next_part_()) {
-    if (part_.starts_with(kByteOrderMark)) part_.remove_prefix(kByteOrderMark.size());
+    const std::string_view header = part_.substr(0, part_.find('\n'));
+    if (header.find(',') == std::string_view::npos && header.find(';') != std::string_view::npos)
+      separator_ = ';';
   }
+
+  [[nodiscard]] bool has_semicolons() const { return separator_ == ';'; }
 
   [[nodiscard]] bool at_end() {
     if (position_ == part_.size() && !part_.empty()) {
@@ -82,7 +86,7 @@ class CsvTable::Parser {
     Record record{{}, line_};
     begin_ = offset_ + position_;
     do record.fields.push_back(peek() == '"' ? quoted_field() : plain_field());
-    while (take(','));
+    while (take(separator_));
     take('\n');
     ++line_;
     return record;
@@ -109,7 +113,7 @@ class CsvTable::Parser {
     return true;
   }
 
-  [[nodiscard]] bool is_at_separator() { return peek() == ',' || peek() == '\n'; }
+  [[nodiscard]] bool is_at_separator() { return peek() == separator_ || peek() == '\n'; }
 
   [[nodiscard]] std::string here() const { return path_ + ":" + std::to_string(line_); }
 
@@ -151,6 +155,7 @@ class CsvTable::Parser {
   std::function<std::string_view()> next_part_;
   const std::string& path_;
   std::string_view part_;
+  char separator_ = ',';
   std::size_t position_ = 0;  ///< in the part
   std::size_t offset_ = 0;    ///< of the part in the text
   std::size_t begin_ = 0;     ///< of the row in the text
@@ -161,6 +166,7 @@ CsvTable CsvTable::header_of(Parser& parser, const std::string& path) {
   if (parser.at_end()) throw FileError(path, "is empty; a header line was expected");
   CsvTable table(parser.next_record().fields);
   table.path_ = path;
+  table.has_decimal_commas_ = parser.has_semicolons();
   std::set<std::string_view> seen;
   for (const std::string& column : table.columns_)
     if (!seen.insert(column).second)
@@ -231,7 +237,9 @@ const std::string& CsvTable::text(std::size_t row, std::string_view column) cons
 
 double CsvTable::number(std::size_t row, std::string_view column) const {
   const std::string& value = text(row, column);
-  if (const auto parsed = finite_number(trimmed(value))) return *parsed;
+  std::string number(trimmed(value));
+  if (has_decimal_commas_) std::ranges::replace(number, ',', '.');
+  if (const auto parsed = finite_number(number)) return *parsed;
   throw FileError(where(row), std::string(column), "a finite number", "'" + value + "'");
 }
 

@@ -13,7 +13,8 @@
 
 namespace af {
 
-/// A CSV file with a header line, in memory; values as text. RFC 4180 quoting.
+/// A CSV file with a header line, in memory; values as text. RFC 4180 quoting. Where the header has
+/// semicolons and no comma, semicolons separate fields and numbers may have a decimal comma.
 class CsvTable {
  public:
   explicit CsvTable(std::vector<std::string> columns) : columns_(std::move(columns)) {}
@@ -51,6 +52,7 @@ class CsvTable {
   std::vector<std::vector<std::string>> rows_;
   std::vector<std::size_t> lines_;  ///< of the file, where each row begins
   std::string path_;
+  bool has_decimal_commas_ = false;
 };
 
 /// Writes a table of `row_count` rows, made a few thousand at a time, for tables too long to be

@@ -42,6 +42,7 @@ class CameraConventions : public testing::Test {
     EXPECT_LT((camera.project(point) - at).norm(), kConventionPx)
         << camera.project(point).transpose() << " instead of " << at.transpose();
   }
+  [[nodiscard]] const std::vector<std::string>& warnings() const { return warnings_; }
 
  private:
   test::ScratchFolder folder_;
@@ -82,6 +83,9 @@ TEST_F(CameraConventions, MayaCam2Refusals) {
   EXPECT_THAT(input_refusal(test::replaced(good, "1024,768", "1e18,768")), HasSubstr("32768"));
   EXPECT_THAT(input_refusal(test::replaced(good, "-1,0,0", "1,0,0")), HasSubstr("rotation"));
   EXPECT_THAT(input_refusal(test::replaced(good, "1000\n", "1e9\n")), HasSubstr("1e6 mm"));
+  EXPECT_THAT(input_refusal(good + "skew\n0\n"),
+              HasSubstr("camera.txt:18: line = 'skew': is not known"));
+  EXPECT_THAT(input_refusal(good + "rotation\n1,0,0\n"), HasSubstr("camera.txt:18"));
 }
 
 // The source is at (0, -1000, 0). Turned by 90 deg about x, the camera's z axis, behind it, points
@@ -106,6 +110,12 @@ TEST_F(CameraConventions, MayaCam1TurnsAboutZThenYThenX) {
   EXPECT_LT((oblique.column_direction - Vector3d(0, std::cos(angle), -std::sin(angle))).norm(),
             1e-12);
   EXPECT_EQ(oblique.size_px, Eigen::Vector2i(1024, 1024));
+}
+
+TEST_F(CameraConventions, AByteOrderMarkIsNoPartOfTheText) {
+  const std::string mark = "\xEF\xBB\xBF";
+  EXPECT_EQ(camera(mark + kMayaCam2).source_point, camera(kMayaCam2).source_point);
+  EXPECT_EQ(camera(mark + kMayaCam1).source_point, camera(kMayaCam1).source_point);
 }
 
 TEST_F(CameraConventions, MayaCam1Refusals) {
@@ -256,6 +266,20 @@ TEST_F(CameraConventions, OpenCvRefusals) {
       "K1: [1000, 0, 320, 0, 1000, 240, 0, 0, 1]\nK2: [1000, 0, 320, 0, 1000, 240, 0, 0, 1]\n"
       "R: [1, 0, 0, 0, 1, 0, 0, 0, 1]\nt: [0, 0, 500]\n";
   EXPECT_THAT(input_refusal(stereo), HasSubstr("relative to the first camera"));
+  EXPECT_THAT(input_refusal(good + "distortion_model: equidistant\n"),
+              HasSubstr("distortion_model = 'equidistant'"));
+  EXPECT_THAT(file_refusal(good + "distortion_model equidistant\n"), HasSubstr("camera.txt:27"));
+}
+
+TEST_F(CameraConventions, WhatIsNotReadOfFilesThatHoldMoreThanCamerasIsNamed) {
+  (void)read(std::string(kOpenCv) + "reprojection_error: 0.3\n");
+  EXPECT_THAT(warnings(), testing::Contains(HasSubstr("not read: reprojection_error")));
+  (void)read(
+      "K1: [1000, 0, 320, 0, 1000, 240, 0, 0, 1]\nR1: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n"
+      "t1: [0, 0, 500]\nK2: [1000, 0, 320, 0, 1000, 240, 0, 0, 1]\n"
+      "R2: [0, 0, -1, 0, 1, 0, 1, 0, 0]\nt2: [0, 0, 600]\nT: [1, 0, 0]\n"
+      "image_size: [640, 480]\n");
+  EXPECT_THAT(warnings(), testing::Contains(HasSubstr("not read: T")));
 }
 
 TEST_F(CameraConventions, TheOnlyCameraMayHaveANumber) {
@@ -451,7 +475,42 @@ TEST_F(CameraConventions, RtkOriginOfTheProjectionsAndTheirMatrix) {
               HasSubstr("does not agree"));
 }
 
+/// A file of RTK's: distances, and these projections.
+std::string rtk_file(const std::string& projections, const std::string& version = "3") {
+  return "<RTKThreeDCircularGeometry version=\"" + version +
+         "\"><SourceToIsocenterDistance>742.46</SourceToIsocenterDistance>"
+         "<SourceToDetectorDistance>1209.96</SourceToDetectorDistance>" +
+         projections + "</RTKThreeDCircularGeometry>";
+}
+
+TEST_F(CameraConventions, RtkTakesNamesAndValuesAsRtkDoes) {
+  const std::string angle = "<GantryAngle>119.4</GantryAngle>";
+  const std::string tilted =
+      "<Projection>" + angle + "<OutOfPlaneAngle>25</OutOfPlaneAngle></Projection>";
+  const std::string moved = "<ProjectionOffsetX>30</ProjectionOffsetX>";
+  const std::vector<std::array<std::string, 2>> same = {
+      {"<Projection><Angle>119.4</Angle></Projection>", "<Projection>" + angle + "</Projection>"},
+      {"<projection>" + angle + "<OutofPlaneAngle>25</OutofPlaneAngle></projection>", tilted},
+      {"<Projection>" + moved + "</Projection><Projection>" + angle + "</Projection>",
+       "<Projection>" + moved + "</Projection><Projection>" + angle + moved + "</Projection>"}};
+  for (const auto& [as_written, as_meant] : same) {
+    const CameraRig found = read(rtk_file(as_written), rtk_options());
+    const CameraRig meant = read(rtk_file(as_meant, "2"), rtk_options());
+    ASSERT_EQ(found.cameras.size(), meant.cameras.size());
+    for (std::size_t i = 0; i < meant.cameras.size(); ++i) {
+      EXPECT_EQ(found.cameras[i].source_point, meant.cameras[i].source_point) << as_written;
+      EXPECT_EQ(found.cameras[i].project({10, 20, 30}), meant.cameras[i].project({10, 20, 30}));
+    }
+  }
+}
+
 TEST_F(CameraConventions, RtkRefusals) {
+  const std::string projection = "<Projection></Projection>";
+  for (const char* version : {"1", "4", ""})
+    EXPECT_THAT(input_refusal(rtk_file(projection, version)), HasSubstr("version"));
+  EXPECT_THAT(input_refusal(rtk_file("<Projection>\n<Tilt>3</Tilt></Projection>")),
+              HasSubstr("camera.txt:2: element = <Tilt>"));
+  EXPECT_THAT(input_refusal(rtk_file("<Scan>" + projection + "</Scan>")), HasSubstr("<Scan>"));
   const std::string good = kRtk;
   EXPECT_THAT(input_refusal(good), HasSubstr("--rig-size-px"));
   CameraFileOptions no_spacing;
@@ -462,8 +521,7 @@ TEST_F(CameraConventions, RtkRefusals) {
   EXPECT_THAT(file_refusal(test::replaced(good, ">90<", ">ninety<")), HasSubstr("GantryAngle"));
   EXPECT_THAT(input_refusal(test::replaced(good, ">90<", ">nan<")), HasSubstr("finite"));
   EXPECT_THAT(input_refusal(test::replaced(good, ">1536<", ">0<")), HasSubstr("parallel"));
-  EXPECT_THAT(file_refusal("<RTKThreeDCircularGeometry></RTKThreeDCircularGeometry>"),
-              HasSubstr("no <Projection>"));
+  EXPECT_THAT(file_refusal(rtk_file("")), HasSubstr("no <Projection>"));
   std::string nested = "<RTKThreeDCircularGeometry>";
   for (int i = 0; i < 100; ++i) nested += "<a>";
   EXPECT_THAT(file_refusal(nested), HasSubstr("nested too deeply"));
@@ -528,7 +586,10 @@ TEST_F(CameraConventions, PlastimatchRefusals) {
   EXPECT_THAT(input_refusal(test::replaced(good, "8.00000000e+02", "inf")), HasSubstr("finite"));
   EXPECT_THAT(input_refusal(test::replaced(good, "8.00000000e+02", "-8e+02")), HasSubstr("SAD"));
   const std::string command = kPlastimatchCommand;
-  EXPECT_THAT(input_refusal(test::replaced(command, "--nrm", "--normal")), HasSubstr("--nrm"));
+  EXPECT_THAT(input_refusal(test::replaced(command, "--nrm \"0.6 -0.7 0.2\"", "")),
+              HasSubstr("--nrm"));
+  EXPECT_THAT(input_refusal(test::replaced(command, "--sad", "--tilt")), HasSubstr("--tilt"));
+  EXPECT_THAT(input_refusal(good + "Tilt 3\n"), HasSubstr("camera.txt:17: line = 'Tilt 3'"));
   EXPECT_THAT(input_refusal(test::replaced(command, "-o ", "-y ")), HasSubstr("--gantry-angle"));
   EXPECT_THAT(input_refusal(test::replaced(command, "0.1 0.2 1'", "0.6 -0.7 0.2'")),
               HasSubstr("parallel"));
@@ -576,6 +637,14 @@ TEST_F(CameraConventions, ElastixRefusals) {
               HasSubstr("PreParameters"));
   EXPECT_THAT(input_refusal(test::replaced(good, "(Direction 1.0", "(Direction 2.0")),
               HasSubstr("column_direction"));
+  EXPECT_THAT(input_refusal(good + "(UseDirectionCosines \"false\")\n"),
+              HasSubstr("UseDirectionCosines"));
+  EXPECT_THAT(input_refusal(good + "(FocalPoint 5.0 -900.0 11.0)\n"), HasSubstr("there twice"));
+  EXPECT_THAT(file_refusal(good + "Tilt 3\n"), HasSubstr("camera.txt:12: 'Tilt 3'"));
+  (void)read(test::replaced(good, "(TransformParameters 0", "(TransformParameters 0.1") +
+             "(Tilt 3)\n");
+  EXPECT_THAT(warnings(), testing::Contains(HasSubstr("not read: Tilt")));
+  EXPECT_THAT(warnings(), testing::Contains(HasSubstr("TransformParameters are a pose")));
 }
 
 /// A camera as xReg states it: 1536 x 1200 pixels of 0.2 mm, 1000 mm from the source.
@@ -661,6 +730,15 @@ TEST_F(CameraConventions, XRegSeveralProjections) {
   expect_seen(rig.cameras[1], {10, 20, 30}, {767.5 + 5000.0 * 25 / 810, 599.5 + 5000.0 * 22 / 810});
 }
 
+TEST_F(CameraConventions, XRegNamesWhatOfACameraIsNotRead) {
+  Hdf5Output file;
+  file.add_group("/proj-params");
+  XRegExample().write(file, "/proj-params", "pixel-");
+  file.add_scalar("/proj-params/tilt", 3.0);
+  (void)read(file.bytes());
+  EXPECT_THAT(warnings(), testing::Contains(HasSubstr("/proj-params/tilt: not read")));
+}
+
 TEST_F(CameraConventions, XRegRefusals) {
   EXPECT_THAT(input_refusal(XRegExample({.row_spacing_mm = 0.3}).deep_fluoro()),
               HasSubstr("/proj-params/pixel-row-spacing = 0.3: must agree with the intrinsic"));
@@ -706,6 +784,8 @@ TEST_F(CameraConventions, RadRefusals) {
               HasSubstr("from the detector to the source"));
   EXPECT_THAT(input_refusal(test::replaced(good, "0 0 -1 300", "0 0 -2 300")),
               HasSubstr("TPosition"));
+  (void)read("Tilt[deg]: 3\n" + good);
+  EXPECT_THAT(warnings(), testing::Contains(HasSubstr("not read: Tilt[deg]")));
 }
 
 constexpr const char* kDiffDrr =
@@ -857,6 +937,16 @@ TEST_F(DicomCameras, PatientOrientationTurnsTheImageAround) {
   CameraFileOptions flip;
   flip.flip = "columns";
   EXPECT_FALSE(read(file, flip).cameras.front().is_mirrored());
+}
+
+TEST_F(DicomCameras, AnglesOfTheDetectorAndTheTableAreSaidNotToCount) {
+  test::DicomTestFile file = xa();
+  file.set_text({0x0018, 0x1138}, "DS", "0");
+  file.set_text({0x0018, 0x1530}, "DS", "5");
+  (void)read(file);
+  EXPECT_THAT(warnings(),
+              testing::UnorderedElementsAre(HasSubstr("mirrored"),
+                                            HasSubstr("DetectorPrimaryAngle (0018,1530) = 5")));
 }
 
 TEST_F(DicomCameras, MovingPositionersHaveACameraPerFrame) {

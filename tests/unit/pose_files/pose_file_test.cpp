@@ -17,6 +17,7 @@ namespace {
 using Eigen::Vector3d;
 using test::message_of;
 using testing::AllOf;
+using testing::ElementsAre;
 using testing::HasSubstr;
 
 // Two inversions of a pose with translations up to 1000 mm.
@@ -43,6 +44,10 @@ class PoseFile : public testing::Test {
   std::vector<RigidTransform> read_csv(const std::string& text, const PoseFrame& frame = {}) {
     test::write_input(folder_ / "p.csv", text);
     return read_poses(folder_ / "p.csv", {frame, {}, {}, {}});
+  }
+  std::vector<std::string> notes_of(const std::string& name, const std::string& text) {
+    test::write_input(folder_ / name, text);
+    return read_pose_file(folder_ / name, {PoseFrame{}, {}, {}, {}}).notes;
   }
   [[nodiscard]] std::string path(const std::string& name) const { return folder_ / name; }
 
@@ -237,6 +242,28 @@ TEST_F(PoseFile, CsvOfMatricesIsRoomFromCt) {
     ASSERT_EQ(poses.size(), 1U);
     EXPECT_EQ(poses[0].matrix(), pose_.matrix());
   }
+}
+
+TEST_F(PoseFile, WhatIsNotReadIsNamed) {
+  const std::string header = "case,rx_deg,ry_deg,rz_deg,tx_mm,ty_mm,tz_mm\n";
+  EXPECT_THAT(notes_of("p.csv", header + "A,1,2,3,4,5,6\n"),
+              ElementsAre(HasSubstr("not read: case")));
+  EXPECT_THAT(notes_of("p.json", json_text(pose_)), ElementsAre(HasSubstr("not read: similarity")));
+  EXPECT_THAT(
+      message_of<InputError>([&] { read("p.toml", pose_to_toml(pose_) + "unit = \"m\"\n"); }),
+      HasSubstr("unit"));
+  EXPECT_THAT(
+      message_of<InputError>([&] { read("p.tfm", pose_to_itk_transform(pose_) + "Unit: m\n"); }),
+      HasSubstr("'Unit'"));
+}
+
+TEST_F(PoseFile, AByteOrderMarkIsNoPartOfTheText) {
+  const std::string mark = "\xEF\xBB\xBF";
+  EXPECT_EQ(read("p.txt", mark + rows_text(pose_, " ")).matrix(), pose_.matrix());
+  EXPECT_EQ(read("p.tfm", mark + pose_to_itk_transform(pose_)).matrix(),
+            read("p.tfm", pose_to_itk_transform(pose_)).matrix());
+  EXPECT_EQ(read("p.toml", mark + pose_to_toml(pose_)).matrix(), pose_.matrix());
+  EXPECT_EQ(read("p.json", mark + json_text(pose_)).matrix(), pose_.matrix());
 }
 
 TEST_F(PoseFile, CsvErrorsNameFileLineColumnAndValue) {

@@ -73,6 +73,20 @@ TEST_F(CsvTableFile, AcceptsCrLfByteOrderMarkAndNoLastLineEnd) {
   EXPECT_EQ(table.number(1, "b"), 4.0);
 }
 
+TEST_F(CsvTableFile, SemicolonsSeparateFieldsOfNumbersWithDecimalCommas) {
+  const CsvTable table = read("a;b\r\n1,5;\"x;y\"\r\n-2,5e-3;1.5\r\n");
+  EXPECT_THAT(table.columns(), ElementsAre("a", "b"));
+  ASSERT_EQ(table.row_count(), 2U);
+  EXPECT_EQ(table.number(0, "a"), 1.5);
+  EXPECT_EQ(table.text(0, "b"), "x;y");
+  EXPECT_EQ(table.number(1, "a"), -2.5e-3);
+  EXPECT_EQ(table.number(1, "b"), 1.5);
+  EXPECT_THAT(message_of<FileError>([&] { (void)read("a;b\n1.234,5;2\n").number(0, "a"); }),
+              HasSubstr("'1.234,5'"));
+  EXPECT_THAT(refusal("a;b\n1,2\n"), HasSubstr(path() + ":2: number of fields"));
+  EXPECT_THAT(read(CsvTable({"one; only"}).to_text()).columns(), ElementsAre("one; only"));
+}
+
 TEST_F(CsvTableFile, IgnoresABlankLineAtTheEndOnly) {
   EXPECT_EQ(read("a,b\n1,2\n\n").row_count(), 1U);
   EXPECT_THAT(refusal("a,b\n\n1,2\n"),
