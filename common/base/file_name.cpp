@@ -15,7 +15,8 @@ bool is_plain_file_name(std::string_view name) {
     return code < ' ' || code == kDelete || character == '/';
   };
   return !name.empty() && name.size() <= kMaxBytes && name != "." && name != ".." &&
-         std::none_of(name.begin(), name.end(), is_bad);
+         std::none_of(name.begin(), name.end(), is_bad) &&
+         std::string_view("=+-@").find(name.front()) == std::string_view::npos;
 }
 
 }  // namespace af

@@ -271,10 +271,8 @@ std::string builtin_rig_text(const std::string& name) {
 
 std::string camera_name_problem(const std::string& name) {
   if (!is_utf8(name)) return "must be UTF-8: a rig.toml could not state it";
-  if (is_plain_file_name(name) && name.find('=') == std::string::npos && name.front() != '-')
-    return "";
-  return "must be usable in a file name: at most 100 bytes, no '/', '=' or control characters, no "
-         "'-' in front";
+  if (is_plain_file_name(name) && name.find('=') == std::string::npos) return "";
+  return std::string("must be usable in a file name") + kPlainFileName + "; no '='";
 }
 
 CameraRig parse_rig(const std::string& text,

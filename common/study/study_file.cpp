@@ -272,8 +272,7 @@ StudyView read_view(const toml::table& table,
 /// Case names become parts of file names.
 void check_case_name(TomlTableReader& reader, const std::string& name) {
   if (!name.empty() && !is_plain_file_name(name))
-    reader.add_problem(
-        "name", "must be usable as a file name: at most 100 bytes, no '/' or control characters");
+    reader.add_problem("name", std::string("must be usable in a file name") + kPlainFileName);
 }
 
 void read_views(TomlTableReader& reader,

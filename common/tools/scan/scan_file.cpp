@@ -247,7 +247,8 @@ ScanFile parse_scan_file(const std::string& text, const std::string& file) {
   TomlTableReader reader(table, "", problems);
   ScanFile result;
   result.name = reader.get_string("name", Presence::Optional).value_or("scan");
-  if (!is_plain_file_name(result.name)) reader.add_problem("name", "must be usable in a file name");
+  if (!is_plain_file_name(result.name))
+    reader.add_problem("name", std::string("must be usable in a file name") + kPlainFileName);
   read_geometry(reader, result.scan);
   const std::filesystem::path folder = std::filesystem::path(file).parent_path();
   read_angles(reader, folder, result.scan);
