@@ -10,12 +10,10 @@ void describe_start(Fields& field, RegisterOptions& options) {
   field("start_rotation_deg",
         options.start_rotation_deg,
         "Start: rx,ry,rz about the room's axes through the ROI centre, degrees, relative to the "
-        "case's nominal pose (default 0,0,0)")
-      .comma_separated();
+        "case's nominal pose (default 0,0,0)");
   field("start_translation_mm",
         options.start_translation_mm,
-        "Start: tx,ty,tz along the room's axes, mm, relative to nominal (default 0,0,0)")
-      .comma_separated();
+        "Start: tx,ty,tz along the room's axes, mm, relative to nominal (default 0,0,0)");
   field("start",
         options.start,
         "Start when no other is given: nominal, landmarks (the pose that the study's "

@@ -13,6 +13,13 @@ namespace {
 template <typename T>
 constexpr bool kIsText = std::is_same_v<T, std::string> || std::is_same_v<T, std::filesystem::path>;
 
+template <typename T>
+constexpr bool kIsArray = false;
+template <typename T, std::size_t Size>
+constexpr bool kIsArray<std::array<T, Size>> = true;
+template <typename T>
+constexpr bool kIsArray<std::optional<T>> = kIsArray<T>;
+
 std::string words_of_list(const std::vector<std::string>& names) {
   std::string text;
   for (std::size_t i = 0; i < names.size(); ++i)
@@ -219,6 +226,10 @@ Field& Fields::add(const std::string& name, FieldValue value, const std::string&
   field.value = value;
   field.help = help;
   field.group = group_;
+  // Points and directions.
+  field.is_comma_separated = std::visit(
+      [](const auto* of_field) { return kIsArray<std::remove_cvref_t<decltype(*of_field)>>; },
+      value);
   return field;
 }
 

@@ -80,7 +80,8 @@ void bind_field(CLI::App& app, const Field& field) {
   if (!field.choices.empty()) option->check(CLI::IsMember(field.choices));
   if (field.is_checked_when_typed) option->check(check_of(field));
   if (field.number_count > 0) option->expected(field.number_count);
-  if (field.is_comma_separated) option->delimiter(',');
+  // Without extra arguments the words that follow a complete list are not taken into it.
+  if (field.is_comma_separated) option->delimiter(',')->allow_extra_args(false);
   if (field.takes_one_at_a_time) option->allow_extra_args(false);
   if (field.is_size) {
     option->transform(CLI::AsSizeValue(true));

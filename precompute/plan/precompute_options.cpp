@@ -32,6 +32,7 @@ void describe_source(Fields& field, PrecomputeOptions& options) {
         options.center_ct_mm,
         "x,y,z: point of the CT (DICOM LPS, mm) about which it turns and which the nominal pose "
         "puts at the isocentre [CT centre]")
+      .count(3)
       .comma_separated()
       .input();
   field("nominal_pose",

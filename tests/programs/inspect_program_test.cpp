@@ -172,6 +172,26 @@ TEST(AfInspect, DescribesRigsByNameAndFileAndWarnsOfMirroredOnes) {
   EXPECT_THAT(warnings, Contains(HasSubstr("mirrored")));
 }
 
+TEST(AfInspect, TakesTheIsocentreOfARigInEveryForm) {
+  const ScratchFolder folder;
+  write_bytes(folder / "cam.txt",
+              "image size\n1024,768\n\ncamera matrix\n5000,0,511.5\n0,5000,383.5\n0,0,1\n\n"
+              "rotation\n0,1,0\n0,0,-1\n-1,0,0\n\ntranslation\n0\n0\n1000\n");
+  const std::string from = "--rig-from " + (folder / "cam.txt").string() + " ";
+  const std::string out = " -o " + (folder / "rig.toml").string();
+  for (const std::string& line : {from + "--rig-isocenter-point=-10.5,20,30" + out,
+                                  from + "--rig-isocenter-point -10.5,20,30" + out,
+                                  "--rig-isocenter-point -10.5,20,30 " + from + out,
+                                  from + out + " --rig-isocenter-point -10.5 20 30"}) {
+    fs::remove(folder / "rig.toml");
+    const test::ProgramRun run = inspect(line);
+    EXPECT_EQ(run.exit_code, 0) << run.output;
+    EXPECT_EQ(read_rig((folder / "rig.toml").string()).isocenter_point,
+              Eigen::Vector3d(-10.5, 20, 30))
+        << line;
+  }
+}
+
 TEST(AfInspect, RecognisesPosesTablesAndResults) {
   const ScratchFolder folder;
   const RigidTransform pose(Eigen::Translation3d(1, 2, 3));

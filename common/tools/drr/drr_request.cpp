@@ -91,12 +91,10 @@ void describe_pose(Fields& field, DrrOptions& options) {
   field("rotation_deg",
         options.rotation_deg,
         "rx,ry,rz about the room's axes, degrees, relative to the nominal pose: the field's, or "
-        "the CT's centre at the rig's isocentre (default 0,0,0)")
-      .comma_separated();
+        "the CT's centre at the rig's isocentre (default 0,0,0)");
   field("translation_mm",
         options.translation_mm,
-        "tx,ty,tz along the room's axes, mm (default 0,0,0)")
-      .comma_separated();
+        "tx,ty,tz along the room's axes, mm (default 0,0,0)");
   field("pose", options.pose, "File with one pose of any format that docs/poses.md lists")
       .stands_for(PathRole::InputTransform, ".tfm");
   field("poses",
@@ -113,8 +111,7 @@ void describe_output(Fields& field, DrrOptions& options) {
   field("invert", options.invert, "PNG: dark is attenuated, the look of a film");
   field("window_percent",
         options.window_percent,
-        "PNG: low,high percentile of the DRR that become black and white")
-      .comma_separated();
+        "PNG: low,high percentile of the DRR that become black and white");
   field("threads",
         options.threads,
         "Threads that share a large DRR, or the DRRs of --poses; 0: every processor");

@@ -40,13 +40,30 @@ struct Options {
   }
 };
 
+/// Options of lists before a word that is none.
+struct ListOptions {
+  std::vector<int> sides;
+  std::optional<std::array<double, 3>> point;
+  std::uint64_t memory_bytes = 0;
+  std::string file;
+
+  void describe(Fields& field) {
+    field("sides", sides, "Sides").count(2).comma_separated();
+    field("point", point, "A point");
+    field("memory_bytes", memory_bytes, "Memory").as("-m").size();
+    field("file", file, "A file").as("file");
+  }
+};
+
+template <typename OptionsType>
 struct Parsed {
-  Options options;
+  OptionsType options;
   std::string help;
 };
 
-Parsed parsed(const std::string& line) {
-  Parsed result;
+template <typename OptionsType = Options>
+Parsed<OptionsType> parsed(const std::string& line) {
+  Parsed<OptionsType> result;
   CLI::App app{"test"};
   bind_options(app, result.options);
   result.help = app.help();
@@ -81,6 +98,22 @@ TEST(BindOptions, ReadsEveryKindOfField) {
   EXPECT_THAT(options.sides, ElementsAre(3, 4));
   EXPECT_THAT(options.hints, ElementsAre("a=1", "b=2"));
   EXPECT_EQ(options.share, 0.25);
+}
+
+TEST(BindOptions, AListTakesCommasOrWordsAndNothingBehindIt) {
+  for (const char* point : {"--point=-10.5,20,30", "--point -10.5,20,30", "--point -10.5 20 30"})
+    for (const char* sides : {"--sides 3,4", "--sides=3,4", "--sides 3 4"})
+      for (const std::string& line : {std::string(point) + " " + sides + " f -m 2kb",
+                                      std::string(sides) + " " + point + " f -m 2kb",
+                                      std::string("f -m 2kb ") + sides + " " + point}) {
+        const ListOptions options = parsed<ListOptions>(line).options;
+        EXPECT_EQ(options.point, (std::array{-10.5, 20.0, 30.0})) << line;
+        EXPECT_THAT(options.sides, ElementsAre(3, 4)) << line;
+        EXPECT_EQ(options.file, "f") << line;
+        EXPECT_EQ(options.memory_bytes, 2000U) << line;
+      }
+  for (const char* point : {"--point 1,2", "--point 1,2,3,4", "--point 1,2,3 4,5,6", "--point ,,"})
+    EXPECT_THROW(parsed<ListOptions>(std::string("f ") + point), CLI::ParseError) << point;
 }
 
 TEST(BindOptions, RefusesWhatTheDescriptionExcludes) {
