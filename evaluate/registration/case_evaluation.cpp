@@ -16,6 +16,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/named_rows.h"
 #include "base/stored_bytes.h"
 #include "evaluate/methods/loaded_methods.h"
 #include "evaluate/outputs/row_gathering.h"
@@ -481,8 +482,10 @@ PoseTableFrames pose_table_frames(const RegistrationStudyOptions& options,
                                   const StudyCase& study_case,
                                   const RigidTransform& gold_room_from_ct) {
   const std::size_t cases = options.cases.empty() ? study.cases.size() : options.cases.size();
+  const std::vector<std::string> known = names_of(study.cases);
   return {study_case.name,
           cases == 1,
+          {known.begin(), known.end()},
           PoseFrame::about(gold_room_from_ct, study_case.center_ct_mm),
           PoseFrame::about(study_case.nominal_room_from_ct, study_case.center_ct_mm),
           pose_context(study, study_case, options.ct)};

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/joined.h"
 #include "pose_files/pose_file.h"
 #include "pose_files/project_poses.h"
 #include "text/csv_table.h"
@@ -77,6 +78,14 @@ PoseOfRow pose_reader(const CsvTable& table, const PoseTableFrames& frames) {
   return [&](std::size_t row) { return parameter_pose(table, row, "", frames.nominal); };
 }
 
+double seconds_of(const CsvTable& table, std::size_t row) {
+  const double seconds = number_or_nan(table, row, "seconds");
+  if (seconds < 0.0)
+    throw InputError(
+        "seconds", table.text(row, "seconds"), "must not be negative", table.where(row));
+  return seconds;
+}
+
 FoundPoses read_table(const std::filesystem::path& path, const PoseTableFrames& frames) {
   const CsvTable table = CsvTable::read(path);
   if (!table.find_column("start_index").has_value())
@@ -107,7 +116,7 @@ FoundPoses read_table(const std::filesystem::path& path, const PoseTableFrames& 
       continue;
     }
     found.room_from_ct.emplace(*index, *pose);
-    if (has_seconds) found.seconds.emplace(*index, number_or_nan(table, row, "seconds"));
+    if (has_seconds) found.seconds.emplace(*index, seconds_of(table, row));
   }
   return found;
 }
@@ -198,7 +207,15 @@ std::vector<RigidTransform> read_starts(const std::filesystem::path& path,
   const bool has_index = table.find_column("start_index").has_value();
   std::vector<RigidTransform> poses;
   for (std::size_t row = 0; row < table.row_count(); ++row) {
-    if (!is_of_case(table, row, frames)) continue;
+    if (!is_of_case(table, row, frames)) {
+      const std::string& name = table.text(row, "case");
+      if (!frames.cases.contains(name))
+        throw InputError("case",
+                         "'" + name + "'",
+                         "is not in the study, which has " + joined(frames.cases),
+                         table.where(row));
+      continue;
+    }
     if (has_index && start_index_of(table, row) != static_cast<std::int64_t>(poses.size()))
       throw InputError("start_index",
                        table.text(row, "start_index"),

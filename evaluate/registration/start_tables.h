@@ -17,19 +17,21 @@ namespace af::evaluation {
 /// What the columns of a table of poses are relative to.
 struct PoseTableFrames {
   std::string case_name;
-  bool is_only_case = true;  ///< a table or file name need not name the case
-  PoseFrame gold;            ///< of start_rx_deg ... and final_rx_deg ...
-  PoseFrame nominal;         ///< of rx_deg ... tz_mm
-  PoseContext context = {};  ///< of files of poses that are no tables
+  bool is_only_case = true;     ///< a table or file name need not name the case
+  std::set<std::string> cases;  ///< all of the study; starts of others are refused
+  PoseFrame gold;               ///< of start_rx_deg ... and final_rx_deg ...
+  PoseFrame nominal;            ///< of rx_deg ... tz_mm
+  PoseContext context = {};     ///< of files of poses that are no tables
 };
 
 /// The starts of one case from a CSV file, in its order: rows whose `case` is the case's; the pose
 /// is m00 ... m23 of room_from_ct, or start_rx_deg ... start_tz_mm relative to gold. FileError:
-/// unreadable, or a value that is not a number; InputError: no row of the case, a pose that is not
-/// rigid, or a start_index (if there is that column) that differs from the row's place among the
-/// case's rows: a start that is missing, repeated or out of order would renumber the others. A file
-/// of another format of poses (docs/poses.md) holds the starts of the only case; InputError when a
-/// frame before its last pose has none. `notes` get what its reader left out and assumed.
+/// unreadable, or a value that is not a number; InputError: no row of the case, a row of a case
+/// that the study does not have, a pose that is not rigid, or a start_index (if there is that
+/// column) that differs from the row's place among the case's rows: a start that is missing,
+/// repeated or out of order would renumber the others. A file of another format of poses
+/// (docs/poses.md) holds the starts of the only case; InputError when a frame before its last pose
+/// has none. `notes` get what its reader left out and assumed.
 std::vector<RigidTransform> read_starts(const std::filesystem::path& path,
                                         const PoseTableFrames& frames,
                                         std::vector<std::string>& notes);
@@ -46,9 +48,9 @@ struct FoundPoses {
 /// rx_deg ... tz_mm relative to the nominal pose, about the ROI centre. Or a folder of files of one
 /// pose each (docs/poses.md), named [CASE-]INDEX.tfm, .h5, .dcm, .json, .toml, .tra or .txt. Or one
 /// file of several poses that is no table: its first frame or row is start 0 of the only case, and
-/// frames without a pose leave their start without one. Reported as problems: a pose with a value
-/// that is not finite (no pose), a start that occurs twice (the first counts, even if it is no
-/// pose) and a start_index that is not a whole number (no start).
+/// frames without a pose leave their start without one. InputError for seconds below 0. Reported as
+/// problems: a pose with a value that is not finite (no pose), a start that occurs twice (the first
+/// counts, even if it is no pose) and a start_index that is not a whole number (no start).
 FoundPoses read_found_poses(const std::filesystem::path& path, const PoseTableFrames& frames);
 
 /// Says which cases in a table or folder of poses are not among `known`, so that their omission is

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluate/registration/start_tables.h"
 
+#include <cmath>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -52,6 +54,50 @@ TEST_F(FilmWithAGap, IsRefusedAsStarts) {
   std::vector<std::string> notes;
   EXPECT_THAT(message_of<InputError>([&] { read_starts(film_, frames_, notes); }),
               HasSubstr("frame 2"));
+}
+
+/// A table of one case's poses, with more columns than it needs.
+class TableOfPoses : public testing::Test {
+ protected:
+  std::filesystem::path write(const std::string& rows) {
+    test::write_input(
+        folder_ / "t.csv",
+        "case,start_index,seconds,m00,m01,m02,m03,m10,m11,m12,m13,m20,m21,m22,m23\n" + rows);
+    return folder_ / "t.csv";
+  }
+  [[nodiscard]] PoseTableFrames frames() const {
+    PoseTableFrames frames;
+    frames.case_name = "skull-01";
+    frames.cases = {"skull-01", "skull-02"};
+    return frames;
+  }
+  const std::string pose_ = ",1,0,0,0,0,1,0,0,0,0,1,0\n";
+
+ private:
+  test::ScratchFolder folder_;
+};
+
+TEST_F(TableOfPoses, StartsOfACaseThatTheStudyLacksAreRefused) {
+  std::vector<std::string> notes;
+  const std::string rows = "skull-01,0,1" + pose_ + "skull-02,0,1" + pose_;
+  EXPECT_EQ(read_starts(write(rows), frames(), notes).size(), 1U);
+  for (const char* name : {"typo", "Skull-01", "skull-01 ", ""})
+    EXPECT_THAT(message_of<InputError>(
+                    [&] { read_starts(write(rows + name + ",1,1" + pose_), frames(), notes); }),
+                testing::AllOf(HasSubstr("t.csv:4: case = '" + std::string(name) + "'"),
+                               HasSubstr("skull-01, skull-02")));
+}
+
+TEST_F(TableOfPoses, SecondsAreNotNegative) {
+  for (const char* missing : {"", "nan", "inf"})
+    EXPECT_TRUE(
+        std::isnan(read_found_poses(write(std::string("skull-01,0,") + missing + pose_), frames())
+                       .seconds.at(0)));
+  for (const char* negative : {"-1", "-1e-9"})
+    EXPECT_THAT(message_of<InputError>([&] {
+                  read_found_poses(write(std::string("skull-01,0,") + negative + pose_), frames());
+                }),
+                HasSubstr("t.csv:2: seconds = " + std::string(negative) + ":"));
 }
 
 }  // namespace
