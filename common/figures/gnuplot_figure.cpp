@@ -8,7 +8,9 @@
 #include <cstring>
 #include <fcntl.h>
 #include <filesystem>
+#include <fstream>
 #include <spawn.h>
+#include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -25,38 +27,38 @@ namespace {
 constexpr const char* kNotFound =
     "the program 'gnuplot' cannot be run; on Debian: apt-get install gnuplot-nox";
 
-/// A temporary file that ends with this object.
-class TemporaryFile {
+/// A file without a name, in memory, that ends with this object.
+class MemoryFile {
  public:
-  TemporaryFile() {
-    std::string name = (std::filesystem::temp_directory_path() / "af-figure-XXXXXX").string();
-    const int descriptor = mkstemp(name.data());
-    if (descriptor < 0)
-      throw FileError(name, std::string("cannot be created: ") + std::strerror(errno));
-    close(descriptor);
-    path_ = name;
+  MemoryFile() : descriptor_(memfd_create("figure", MFD_CLOEXEC)) {
+    if (descriptor_ < 0)
+      throw FileError("a file in memory",
+                      std::string("cannot be created: ") + std::strerror(errno));
   }
-  ~TemporaryFile() {
-    std::error_code ignored;
-    std::filesystem::remove(path_, ignored);
-  }
-  TemporaryFile(const TemporaryFile&) = delete;
-  TemporaryFile& operator=(const TemporaryFile&) = delete;
+  ~MemoryFile() { close(descriptor_); }
+  MemoryFile(const MemoryFile&) = delete;
+  MemoryFile& operator=(const MemoryFile&) = delete;
 
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+  [[nodiscard]] int descriptor() const { return descriptor_; }
+  [[nodiscard]] std::string path() const { return kFolder + std::to_string(descriptor_); }
+
+  /// Where a process finds its open files.
+  static constexpr const char* kFolder = "/proc/self/fd/";
 
  private:
-  std::filesystem::path path_;
+  int descriptor_;
 };
 
-/// Exit status of "gnuplot ARGUMENT", what it says going to `log`, its standard output to an open
-/// file; throws when it cannot be started.
-int run_gnuplot(const std::string& argument, const std::filesystem::path& log, int output) {
+/// Exit status of "gnuplot ARGUMENT", with a standard input, what it says going to `log`, its
+/// standard output to an open file; throws when it cannot be started.
+int run_gnuplot(const std::string& argument,
+                const MemoryFile& input,
+                const MemoryFile& log,
+                int output) {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-  posix_spawn_file_actions_addopen(
-      &actions, STDERR_FILENO, log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
+  posix_spawn_file_actions_adddup2(&actions, input.descriptor(), STDIN_FILENO);
+  posix_spawn_file_actions_adddup2(&actions, log.descriptor(), STDERR_FILENO);
   posix_spawn_file_actions_adddup2(&actions, output, STDOUT_FILENO);
   // -d: no personal or system-wide settings.
   std::array<std::string, 3> words = {"gnuplot", "-d", argument};
@@ -74,13 +76,15 @@ int run_gnuplot(const std::string& argument, const std::filesystem::path& log, i
 
 /// What a script draws. gnuplot does not notice a full disk, so it is not let near one.
 std::string drawn(const std::string& script, const std::filesystem::path& figure) {
-  const TemporaryFile script_file;
-  const TemporaryFile log;
-  write_text_file(script_file.path(), script);
+  const MemoryFile script_file;
+  const MemoryFile log;
+  if (!(std::ofstream(script_file.path()) << script << std::flush))
+    throw FileError(figure.string(), "its script cannot be kept in memory");
   int status = 0;
-  std::string content = captured_output(figure.string(), [&](int output) {
-    status = run_gnuplot(script_file.path().string(), log.path(), output);
-  });
+  // gnuplot ends at the first error of a file that is named, not of its standard input.
+  const std::string input = MemoryFile::kFolder + std::to_string(STDIN_FILENO);
+  std::string content = captured_output(
+      figure.string(), [&](int output) { status = run_gnuplot(input, script_file, log, output); });
   if (status == 0) return content;
   throw FileError(figure.string(),
                   "gnuplot failed with status " + std::to_string(status) + ": " +
@@ -143,10 +147,11 @@ std::string gnuplot_quoted(std::string_view text) {
 }
 
 void require_gnuplot() {
-  const TemporaryFile log;
+  const MemoryFile nothing;
+  const MemoryFile log;
   int status = 0;
   captured_output("gnuplot",
-                  [&](int output) { status = run_gnuplot("--version", log.path(), output); });
+                  [&](int output) { status = run_gnuplot("--version", nothing, log, output); });
   if (status != 0) throw FileError("gnuplot", kNotFound);
 }
 

@@ -2,6 +2,7 @@
 #include "evaluate/outputs/result_figures.h"
 
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 
 #include <gmock/gmock.h>
@@ -48,6 +49,21 @@ TEST(GnuplotFigure, NamesGnuplotsMessageAndLeavesNothingWhenAScriptIsWrong) {
     EXPECT_THAT(error.what(), HasSubstr("nonsense("));
   }
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+}
+
+TEST(GnuplotFigure, NeedsNoFolderForTemporaryFiles) {
+  const test::ScratchFolder folder;
+  const char* const usual = std::getenv("TMPDIR");
+  const std::string before = usual == nullptr ? "" : usual;
+  setenv("TMPDIR", "/nowhere", 1);
+  GnuplotFigure figure("anywhere", 400, 300);
+  figure.add("plot x");
+  EXPECT_NO_THROW(require_gnuplot());
+  EXPECT_NO_THROW(figure.draw(folder / "a"));
+  if (usual == nullptr)
+    unsetenv("TMPDIR");
+  else
+    setenv("TMPDIR", before.c_str(), 1);
 }
 
 TEST(GnuplotFigure, IsWrittenWholeOrNotAtAll) {
