@@ -66,19 +66,6 @@ std::vector<std::string> arguments_for(const CLI::App& app, int argc, char** arg
   return arguments;
 }
 
-/// Help and version end with 0, every other parse problem with 2; rank 0 prints.
-int report_parse_result(const CLI::App& app, const CLI::ParseError& error, bool prints) {
-  const bool is_success = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success);
-  if (prints) {
-    if (is_success)
-      app.exit(error, std::cout, std::cerr);
-    else
-      std::cerr << app.get_name() << ": " << usage_message(app, error)
-                << "\nRun with --help for more information.\n";
-  }
-  return static_cast<int>(is_success ? ExitCode::Done : ExitCode::Usage);
-}
-
 /// Results on standard output that were not written are a failure: a full disk must not look like a
 /// success.
 int with_output_written(const CLI::App& app, int exit_code) {
@@ -88,6 +75,23 @@ int with_output_written(const CLI::App& app, int exit_code) {
   std::cerr << app.get_name() << ": standard output: cannot be written" << reason << std::endl;
   return exit_code == static_cast<int>(ExitCode::Done) ? static_cast<int>(ExitCode::File)
                                                        : exit_code;
+}
+
+/// Help and version need no MPI.
+bool asks_for_help(const CLI::ParseError& error) {
+  return error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success);
+}
+
+int print_help(const CLI::App& app, const CLI::ParseError& error) {
+  if (MpiEnvironment::is_first_process()) app.exit(error, std::cout, std::cerr);
+  return with_output_written(app, static_cast<int>(ExitCode::Done));
+}
+
+int refuse_usage(const CLI::App& app, const CLI::ParseError& error, const Communicator& world) {
+  if (world.is_root())
+    std::cerr << app.get_name() << ": " << usage_message(app, error)
+              << "\nRun with --help for more information.\n";
+  return static_cast<int>(ExitCode::Usage);
 }
 
 /// What asked for a stop.
@@ -141,8 +145,7 @@ int app_main(CLI::App& app,
              char** argv,
              const std::function<void(const Communicator&)>& run) {
   std::optional<WaitAlarm> alarm;  // outlives MPI
-  const MpiEnvironment environment(argc, argv);
-  const Communicator world = Communicator::world();
+  std::optional<MpiEnvironment> environment;
   app.name(program_name(argv[0]));
   app.set_version_flag("--version", app.get_name() + " " + std::string(program_version()));
   add_help_formats(app);
@@ -150,8 +153,12 @@ int app_main(CLI::App& app,
     app.parse(arguments_for(app, argc, argv));
     check_option_values(app);
   } catch (const CLI::ParseError& error) {
-    return with_output_written(app, report_parse_result(app, error, world.is_root()));
+    if (asks_for_help(error)) return print_help(app, error);
+    environment.emplace(argc, argv);
+    return refuse_usage(app, error, Communicator::world());
   }
+  environment.emplace(argc, argv);
+  const Communicator world = Communicator::world();
   // A write beyond a limit of file sizes is an error to report, not a signal to die from.
   std::signal(SIGXFSZ, SIG_IGN);
   std::optional<StallWatch> watch;

@@ -5,6 +5,8 @@
 #include <array>
 #include <atomic>
 #include <cstdlib>
+#include <string>
+#include <string_view>
 
 #include <mpi.h>
 
@@ -14,6 +16,14 @@ namespace {
 
 std::atomic<bool> abort_required = false;
 
+/// The number of this process where mpirun or srun started it; "" where it stands alone. Of a shell
+/// that srun started, mpirun's variables count.
+std::string launched_rank() {
+  for (const char* name : {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"})
+    if (const char* const rank = std::getenv(name); rank != nullptr) return rank;
+  return "";
+}
+
 /// Whether mpirun or srun started this process, as one of several.
 bool is_launched() {
   constexpr std::array kSetByLaunchers = {
@@ -22,6 +32,29 @@ bool is_launched() {
     return std::getenv(name) != nullptr;
   });
 }
+
+/// Hides a step of one task from MPI while this lives. Such a shell, by srun, needs no process
+/// manager, but Open MPI looks for Slurm's and ends the program where there is none.
+class HiddenStep {
+ public:
+  HiddenStep() {
+    const char* const tasks = std::getenv("SLURM_STEP_NUM_TASKS");
+    const char* const step = std::getenv(kStep);
+    if (is_launched() || tasks == nullptr || std::string_view(tasks) != "1" || step == nullptr)
+      return;
+    step_ = step;
+    unsetenv(kStep);
+  }
+  ~HiddenStep() {
+    if (!step_.empty()) setenv(kStep, step_.c_str(), 1);
+  }
+  HiddenStep(const HiddenStep&) = delete;
+  HiddenStep& operator=(const HiddenStep&) = delete;
+
+ private:
+  static constexpr const char* kStep = "SLURM_STEP_ID";
+  std::string step_;
+};
 
 }  // namespace
 
@@ -40,6 +73,7 @@ MpiEnvironment::MpiEnvironment(int& argc, char**& argv) {
   // stays.
   setenv("OMPI_MCA_sharedfp", is_alone ? "^lockedfile,sm" : "^lockedfile", 0);
   const bool names_process_manager = std::getenv("OMPI_MCA_pmix") != nullptr;
+  const HiddenStep hidden_step;
   int provided = 0;
   MPI_Init_thread(&argc, &argv, MPI_THREAD_FUNNELED, &provided);
   // Open MPI notes that there is no process manager, which would crash an mpirun that we or our
@@ -47,6 +81,11 @@ MpiEnvironment::MpiEnvironment(int& argc, char**& argv) {
   if (!names_process_manager) unsetenv("OMPI_MCA_pmix");
   // What this program starts may need its folder.
   if (needs_no_folder) unsetenv(kMakesFolder);
+}
+
+bool MpiEnvironment::is_first_process() {
+  const std::string rank = launched_rank();
+  return rank.empty() || rank == "0";
 }
 
 MpiEnvironment::~MpiEnvironment() {

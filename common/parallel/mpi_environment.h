@@ -4,13 +4,17 @@
 namespace af {
 
 /// Lifetime of MPI in a program: initialised by the constructor, finalised by the destructor. One
-/// per process, made first thing in main. Works with and without mpirun.
+/// per process. Works with and without mpirun, and in a shell that srun started as its only task.
 class MpiEnvironment {
  public:
   MpiEnvironment(int& argc, char**& argv);
   ~MpiEnvironment();
   MpiEnvironment(const MpiEnvironment&) = delete;
   MpiEnvironment& operator=(const MpiEnvironment&) = delete;
+
+  /// Whether this process speaks for the job, told from what launchers leave in its environment:
+  /// for programs that end before MPI begins.
+  [[nodiscard]] static bool is_first_process();
 
   /// Ends every rank of the job with `exit_code`, at once.
   [[noreturn]] static void abort(int exit_code);
