@@ -47,13 +47,18 @@ void set_limit(decltype(RLIMIT_CPU) resource, rlim_t most) {
   ::setrlimit(resource, &limit);
 }
 
-void limit_resources(std::size_t bytes) {
-  constexpr std::size_t kBytesPerSecond = 1u << 20;
+/// Seconds of processor time in which the work must be done.
+std::size_t most_seconds(std::size_t bytes) {
   constexpr std::size_t kFewSeconds = 60;
+  constexpr std::size_t kBytesPerSecond = 1u << 20;
+  return kFewSeconds + bytes / kBytesPerSecond;
+}
+
+void limit_resources(std::size_t bytes) {
   constexpr std::size_t kBytesPerByte = 64;
   constexpr std::size_t kFewBytes = std::size_t{1} << 30;
   set_limit(RLIMIT_CORE, 0);
-  set_limit(RLIMIT_CPU, kFewSeconds + bytes / kBytesPerSecond);
+  set_limit(RLIMIT_CPU, most_seconds(bytes));
   std::size_t pages = 0;  // that the process has already
   if (std::ifstream("/proc/self/statm") >> pages)
     set_limit(RLIMIT_AS,
@@ -68,16 +73,25 @@ void be_quiet() {
   ::dup2(nothing, STDERR_FILENO);
 }
 
-/// Signals end the copy as they would end a plain program, whatever handlers this one has.
+/// Signals end the copy as they would end a plain program, whatever handlers this one has, and
+/// whatever this thread keeps from itself.
 void reset_signals() {
-  for (const int signal : {SIGABRT, SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGXCPU, SIGTERM, SIGINT})
+  sigset_t all;
+  ::sigemptyset(&all);
+  for (const int signal :
+       {SIGABRT, SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGXCPU, SIGTERM, SIGINT, SIGALRM}) {
     ::signal(signal, SIG_DFL);
+    ::sigaddset(&all, signal);
+  }
+  ::pthread_sigmask(SIG_UNBLOCK, &all, nullptr);
 }
 
 [[noreturn]] void run_copy(std::span<char> bytes,
                            char& verdict,
-                           const std::function<bool(std::span<char>)>& work) {
+                           const std::function<bool(std::span<char>)>& work,
+                           unsigned deadline_seconds) {
   reset_signals();
+  ::alarm(deadline_seconds);  // of the kernel: it ends the copy even when that waits for ever
   be_quiet();
   limit_resources(bytes.size());
   Verdict found = Verdict::Refused;
@@ -94,18 +108,25 @@ std::string end_of(int status, Verdict verdict) {
   if (verdict == Verdict::Refused) return "refused it";
   if (!WIFSIGNALED(status)) return "ended without a result";
   const int signal = WTERMSIG(status);
+  if (signal == SIGALRM) return "did not end in time";
   return "ended by signal " + std::to_string(signal) + " (" + ::strsignal(signal) + ")";
 }
 
 }  // namespace
 
-ContainedWork contained_work(std::size_t bytes, const std::function<bool(std::span<char>)>& work) {
+ContainedWork contained_work(std::size_t bytes,
+                             const std::function<bool(std::span<char>)>& work,
+                             std::optional<unsigned> deadline_seconds) {
+  // On a busy machine, work gets a part of a processor.
+  constexpr std::size_t kSecondsPerSecond = 5;
+  const unsigned deadline =
+      deadline_seconds.value_or(static_cast<unsigned>(kSecondsPerSecond * most_seconds(bytes)));
   const SharedBytes shared(bytes + 1);
   const std::span<char> made = shared.bytes().first(bytes);
   char& verdict = shared.bytes().back();
   const pid_t copy = ::fork();
   if (copy < 0) return {false, {}, std::string("cannot be started: ") + std::strerror(errno)};
-  if (copy == 0) run_copy(made, verdict, work);
+  if (copy == 0) run_copy(made, verdict, work, deadline);
   int status = 0;
   while (::waitpid(copy, &status, 0) < 0 && errno == EINTR) {
   }

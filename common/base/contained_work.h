@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -19,8 +20,12 @@ struct ContainedWork {
 /// Runs `work` in a copy of this process, because third-party code may end it by a signal (a failed
 /// assertion in a decoder, say). The copy shares only the output bytes with this process. It has
 /// one thread, prints nothing, leaves no core dump, and is ended when it takes far more memory or
-/// time than that many bytes justify. `work` must neither talk to other processes nor wait for
-/// other threads; an exception counts as false. \test ContainedWork.*
-ContainedWork contained_work(std::size_t bytes, const std::function<bool(std::span<char>)>& work);
+/// time than that many bytes justify. `work` must neither talk to other processes (by MPI, say) nor
+/// wait for other threads; an exception counts as false. What another thread has locked at that
+/// moment stays locked in the copy for ever: the copy has a deadline, in seconds since its start
+/// (by default five times the processor time it may take). \test ContainedWork.*
+ContainedWork contained_work(std::size_t bytes,
+                             const std::function<bool(std::span<char>)>& work,
+                             std::optional<unsigned> deadline_seconds = {});
 
 }  // namespace af

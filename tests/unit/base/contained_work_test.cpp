@@ -4,8 +4,11 @@
 #include <algorithm>
 #include <csignal>
 #include <cstdlib>
+#include <latch>
+#include <mutex>
 #include <new>
 #include <stdexcept>
+#include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -65,6 +68,33 @@ TEST(ContainedWork, IsEndedWhenItAsksForFarMoreMemoryThanItsBytesAreWorth) {
                  bytes[0] = much[much.size() / 2];
                  return true;
                }).is_done);
+}
+
+// As the watchdog's thread may have, or another that reads.
+TEST(ContainedWork, IsEndedWhenItWaitsForWhatAnotherThreadHasLocked) {
+  std::mutex mutex;
+  std::latch is_locked(1), is_over(1);
+  std::jthread other([&] {
+    const std::scoped_lock lock(mutex);
+    is_locked.count_down();
+    is_over.wait();
+  });
+  is_locked.wait();
+  sigset_t alarm;
+  sigemptyset(&alarm);
+  sigaddset(&alarm, SIGALRM);
+  pthread_sigmask(SIG_BLOCK, &alarm, nullptr);
+  const ContainedWork work = contained_work(
+      1,
+      [&](std::span<char>) {
+        const std::scoped_lock lock(mutex);
+        return true;
+      },
+      1);
+  pthread_sigmask(SIG_UNBLOCK, &alarm, nullptr);
+  is_over.count_down();
+  EXPECT_FALSE(work.is_done);
+  EXPECT_EQ(work.trouble, "did not end in time");
 }
 
 TEST(ContainedWork, HandlersOfTheProgramAreNotCalledInTheCopy) {
