@@ -18,6 +18,7 @@
 
 #include "base/build_info.h"
 #include "base/error.h"
+#include "base/host_name.h"
 #include "cli/command_help.h"
 #include "cli/help_pages.h"
 #include "cli/option_values.h"
@@ -175,6 +176,7 @@ int app_main(CLI::App& app,
   RankFailure failure;
   bool is_known_everywhere = false;
   try {
+    require_threads(environment->thread_level());
     run(world);
     return with_output_written(app, static_cast<int>(ExitCode::Done));
   } catch (const RemoteError& error) {

@@ -9,7 +9,9 @@
 #include <stdexcept>
 
 #include "base/error.h"
+#include "base/host_name.h"
 #include "parallel/mpi_handle.h"
+#include "parallel/node_memory_file.h"
 #include "parallel/work_watch.h"
 
 namespace af {
@@ -97,40 +99,39 @@ RankFailure plain_failure_of(const std::exception_ptr& error) {
   }
 }
 
-/// A shared-memory window and the handle that frees it on every rank. Freeing waits for all ranks.
-/// When an exception passes, it may be on this rank alone; then freeing is left to the end of the
-/// process.
-struct NodeWindow {
-  MPI_Win window = MPI_WIN_NULL;
-  int exceptions = std::uncaught_exceptions();
-  ~NodeWindow() {
-    if (window == MPI_WIN_NULL || std::uncaught_exceptions() > exceptions) return;
-    const WaitNote waits;
-    MPI_Win_free(&window);
-  }
-};
-
-/// Aligned as node memory is.
+/// Aligned as memory of a node is.
 std::shared_ptr<std::byte> memory_of_process(std::size_t bytes) {
   constexpr std::align_val_t kAlignment{Communicator::kNodeMemoryAlignment};
   return {static_cast<std::byte*>(::operator new(bytes, kAlignment)),
           [](std::byte* memory) { ::operator delete(memory, kAlignment); }};
 }
 
-}  // namespace
-
-Communicator::Impl::~Impl() {
-  // As with NodeWindow: the other ranks may not come here.
-  if (is_owned && handle != MPI_COMM_NULL && std::uncaught_exceptions() == 0)
-    MPI_Comm_free(&handle);
+/// Collective over `world`; the same memory for all ranks of `node`.
+std::shared_ptr<std::byte> memory_of_node(const Communicator& world,
+                                          const Communicator& node,
+                                          std::size_t bytes) {
+  NodeMemoryFile file;
+  std::string name;
+  all_or_none(world, [&] {
+    if (node.size() > 1 && node.is_root()) name = file.create(bytes);
+  });
+  node.broadcast(name);
+  return all_or_none(world, [&] {
+    if (node.size() == 1) return memory_of_process(bytes);
+    if (!node.is_root()) file.open(name);
+    return file.map(bytes);
+  });
 }
 
+}  // namespace
+
 Communicator Communicator::world() {
-  return Communicator(std::make_shared<Impl>(MPI_COMM_WORLD, false));
+  static const auto kWorld = std::make_shared<Impl>(Impl{MPI_COMM_WORLD});
+  return Communicator(kWorld);
 }
 
 Communicator Communicator::alone() {
-  return Communicator(std::make_shared<Impl>(MPI_COMM_NULL, false));
+  return Communicator(std::make_shared<Impl>());
 }
 
 int Communicator::rank() const {
@@ -183,31 +184,50 @@ std::vector<std::vector<std::byte>> Communicator::all_gather(
     std::span<const std::byte> mine) const {
   if (is_alone(impl_->handle)) return {{mine.begin(), mine.end()}};
   const WaitNote waits;
-  std::vector<std::vector<std::byte>> parts(static_cast<std::size_t>(size()));
-  for (int source = 0; source < size(); ++source) {
-    auto& part = parts[static_cast<std::size_t>(source)];
-    if (source == rank()) part.assign(mine.begin(), mine.end());
-    std::uint64_t bytes = part.size();
-    require_success(MPI_Bcast(&bytes, 1, MPI_UINT64_T, source, impl_->handle), "MPI_Bcast");
-    part.resize(bytes);
-    for (std::size_t first = 0; first < part.size(); first += kLargestPiece)
-      require_success(MPI_Bcast(part.data() + first,
-                                static_cast<int>(std::min(kLargestPiece, part.size() - first)),
-                                MPI_BYTE,
-                                source,
-                                impl_->handle),
-                      "MPI_Bcast");
+  const auto ranks = static_cast<std::size_t>(size());
+  const std::uint64_t my_bytes = mine.size();
+  std::vector<std::uint64_t> bytes(ranks);
+  require_success(
+      MPI_Allgather(&my_bytes, 1, MPI_UINT64_T, bytes.data(), 1, MPI_UINT64_T, impl_->handle),
+      "MPI_Allgather");
+  std::vector<std::vector<std::byte>> parts(ranks);
+  const std::size_t piece = kLargestPiece / ranks;
+  for (std::size_t first = 0; first < *std::ranges::max_element(bytes); first += piece) {
+    std::vector<int> counts, offsets;
+    int total = 0;
+    for (const std::uint64_t of_rank : bytes) {
+      offsets.push_back(total);
+      counts.push_back(static_cast<int>(std::min(piece, of_rank - std::min(of_rank, first))));
+      total += counts.back();
+    }
+    std::vector<std::byte> all(static_cast<std::size_t>(total));
+    require_success(MPI_Allgatherv(mine.data() + std::min(mine.size(), first),
+                                   counts[static_cast<std::size_t>(rank())],
+                                   MPI_BYTE,
+                                   all.data(),
+                                   counts.data(),
+                                   offsets.data(),
+                                   MPI_BYTE,
+                                   impl_->handle),
+                    "MPI_Allgatherv");
+    for (std::size_t i = 0; i < ranks; ++i)
+      parts[i].insert(
+          parts[i].end(), all.begin() + offsets[i], all.begin() + offsets[i] + counts[i]);
   }
   return parts;
 }
 
 Communicator Communicator::node() const {
   if (is_alone(impl_->handle)) return *this;
-  MPI_Comm node_handle = MPI_COMM_NULL;
-  require_success(
-      MPI_Comm_split_type(impl_->handle, MPI_COMM_TYPE_SHARED, rank(), MPI_INFO_NULL, &node_handle),
-      "MPI_Comm_split_type");
-  return Communicator(std::make_shared<Impl>(node_handle, true));
+  if (impl_->node == nullptr) {
+    const WaitNote waits;
+    auto node = std::make_shared<Impl>();
+    require_success(MPI_Comm_split_type(
+                        impl_->handle, MPI_COMM_TYPE_SHARED, rank(), MPI_INFO_NULL, &node->handle),
+                    "MPI_Comm_split_type");
+    impl_->node = std::move(node);
+  }
+  return Communicator(impl_->node);
 }
 
 std::shared_ptr<const std::byte> Communicator::allocate_on_node(
@@ -226,29 +246,14 @@ std::shared_ptr<const std::byte> Communicator::allocate_on_node_together(
     return memory;
   }
   const Communicator on_node = node();
-  auto owner = std::make_shared<NodeWindow>();
-  std::byte* base = nullptr;
-  // Open MPI chooses the alignment, on two ranks 8 bytes.
-  const auto my_bytes =
-      static_cast<MPI_Aint>(on_node.is_root() ? bytes + kNodeMemoryAlignment - 1 : 0);
-  require_success(MPI_Win_allocate_shared(
-                      my_bytes, 1, MPI_INFO_NULL, on_node.impl_->handle, &base, &owner->window),
-                  "MPI_Win_allocate_shared");
-  MPI_Aint shared_bytes = 0;
-  int unit = 1;
-  require_success(MPI_Win_shared_query(owner->window, 0, &shared_bytes, &unit, &base),
-                  "MPI_Win_shared_query");
-  const auto beyond = reinterpret_cast<std::uintptr_t>(base) % kNodeMemoryAlignment;
-  std::array<std::uint64_t, 1> skipped = {
-      on_node.is_root() ? (kNodeMemoryAlignment - beyond) % kNodeMemoryAlignment : 0};
-  on_node.maximum(skipped);
-  base += skipped[0];
+  const std::shared_ptr<std::byte> memory = memory_of_node(*this, on_node, bytes);
   // On all nodes: ranks of another node would otherwise go on to a collective call that these ranks
   // never reach.
-  all_or_none(*this,
-              [&] { fill(std::span<std::byte>(base, bytes), on_node.rank(), on_node.size()); });
+  all_or_none(*this, [&] {
+    fill(std::span<std::byte>(memory.get(), bytes), on_node.rank(), on_node.size());
+  });
   on_node.barrier();
-  return {owner, base};
+  return memory;
 }
 
 std::shared_ptr<const std::byte> Communicator::allocate_on_nodes_from_root(

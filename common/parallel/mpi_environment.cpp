@@ -10,6 +10,8 @@
 
 #include <mpi.h>
 
+#include "base/error.h"
+
 namespace af {
 
 namespace {
@@ -74,8 +76,7 @@ MpiEnvironment::MpiEnvironment(int& argc, char**& argv) {
   setenv("OMPI_MCA_sharedfp", is_alone ? "^lockedfile,sm" : "^lockedfile", 0);
   const bool names_process_manager = std::getenv("OMPI_MCA_pmix") != nullptr;
   const HiddenStep hidden_step;
-  int provided = 0;
-  MPI_Init_thread(&argc, &argv, MPI_THREAD_FUNNELED, &provided);
+  MPI_Init_thread(&argc, &argv, MPI_THREAD_FUNNELED, &thread_level_);
   // Open MPI notes that there is no process manager, which would crash an mpirun that we or our
   // caller start.
   if (!names_process_manager) unsetenv("OMPI_MCA_pmix");
@@ -106,6 +107,15 @@ void MpiEnvironment::require_abort() {
 
 bool MpiEnvironment::is_abort_required() {
   return abort_required;
+}
+
+void require_threads(int thread_level) {
+  if (thread_level >= MPI_THREAD_FUNNELED) return;
+  throw RemoteError(ExitCode::Internal,
+                    "MPI supports no processes with threads (MPI_Init_thread gives level " +
+                        std::to_string(thread_level) + ", needed is MPI_THREAD_FUNNELED, " +
+                        std::to_string(MPI_THREAD_FUNNELED) +
+                        "): use an MPI that was built with them");
 }
 
 }  // namespace af

@@ -16,6 +16,9 @@ class MpiEnvironment {
   /// for programs that end before MPI begins.
   [[nodiscard]] static bool is_first_process();
 
+  /// What MPI says it supports: MPI_THREAD_SINGLE or more.
+  [[nodiscard]] int thread_level() const { return thread_level_; }
+
   /// Ends every rank of the job with `exit_code`, at once.
   [[noreturn]] static void abort(int exit_code);
 
@@ -23,6 +26,14 @@ class MpiEnvironment {
   /// would hang or crash.
   static void require_abort();
   [[nodiscard]] static bool is_abort_required();
+
+ private:
+  int thread_level_ = 0;
 };
+
+/// RemoteError, as every rank is told the same, when MPI's level is below MPI_THREAD_FUNNELED: our
+/// processes have threads, of which the first alone calls MPI.
+/// \test MpiEnvironment.WithoutSupportOfThreadsIsAnError
+void require_threads(int thread_level);
 
 }  // namespace af

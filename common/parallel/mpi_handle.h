@@ -10,12 +10,9 @@ namespace af {
 
 struct Communicator::Impl {
   MPI_Comm handle = MPI_COMM_NULL;  ///< null: Communicator::alone()
-  bool is_owned = false;
-
-  Impl(MPI_Comm communicator_handle, bool owned) : handle(communicator_handle), is_owned(owned) {}
-  ~Impl();
-  Impl(const Impl&) = delete;
-  Impl& operator=(const Impl&) = delete;
+  /// Communicator::node(), once it was asked for. MPI_Finalize() frees it: to free it earlier would
+  /// be a collective call at a place where the other ranks may never come.
+  std::shared_ptr<Impl> node = nullptr;
 };
 
 }  // namespace af

@@ -124,17 +124,25 @@ RankFailure work_until_empty(const Job& job, Ledger& ledger) {
 /// stays in this thread.
 RankFailure run_as_manager(const Communicator& communicator, const Job& job) {
   Ledger ledger(job.count, communicator.size());
-  RankFailure failure;
+  RankFailure failure_of_work;
+  RankFailure failure_of_report;
   std::atomic<bool> is_computing{true};
-  std::thread computing([&] {
-    failure = work_until_empty(job, ledger);
+  std::jthread computing([&] {
+    failure_of_work = work_until_empty(job, ledger);
     is_computing = false;
   });
   int active_workers = communicator.size() - 1;
   std::int64_t reported = 0;
+  // The other ranks wait for their grants, whatever happens here.
   const auto report_progress = [&] {
-    if (const std::int64_t done = ledger.done(); job.on_progress && done > reported)
+    const std::int64_t done = ledger.done();
+    if (!job.on_progress || done <= reported || failure_of_report.exit_code != 0) return;
+    try {
       job.on_progress(reported = done);
+    } catch (...) {
+      ledger.stop();
+      failure_of_report = failure_of(std::current_exception());
+    }
   };
   std::optional<WaitNote> waits;
   while (is_computing || active_workers > 0) {
@@ -146,7 +154,7 @@ RankFailure run_as_manager(const Communicator& communicator, const Job& job) {
   }
   computing.join();
   report_progress();
-  return failure;
+  return failure_of_work.exit_code != 0 ? failure_of_work : failure_of_report;
 }
 
 std::array<std::int64_t, 2> next_grant(MPI_Comm handle) {

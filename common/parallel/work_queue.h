@@ -12,8 +12,8 @@ namespace af {
 /// shrinking blocks. Rank 0 answers requests and works too, in a thread of its own: `work` must not
 /// call MPI. The result of an item must not depend on the rank that computes it. Collective:
 /// returns on every rank when all items are done. When `work` throws on one rank, no further items
-/// are handed out, and every rank throws the error. `on_progress` is called on rank 0, outside that
-/// thread, with the number of finished items.
+/// are handed out, and every rank throws the error; so it is with `on_progress`, which is called on
+/// rank 0, outside that thread, with the number of finished items.
 void for_each_item(const Communicator& communicator,
                    std::int64_t count,
                    const std::function<void(std::int64_t item)>& work,

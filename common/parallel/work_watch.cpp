@@ -14,6 +14,8 @@
 #include <unistd.h>
 #include <utility>
 
+#include "base/host_name.h"
+
 namespace af {
 
 namespace {
@@ -150,11 +152,6 @@ std::string take_failed_unit() {
 
 bool claim_report() {
   return !(*first_note).has_reported.exchange(true);
-}
-
-std::string host_name() {
-  std::array<char, 256> name{};
-  return gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "unknown";
 }
 
 /// The notes of the ranks of this host.

@@ -63,9 +63,6 @@ std::string take_failed_unit();
 /// there is a StallWatch.
 bool claim_report();
 
-/// Name of this host.
-std::string host_name();
-
 /// Calls `on_end`, which must end the process, when it lives for longer than a limit: for the
 /// moments in which ranks wait for each other and no StallWatch sees them, while that one is made
 /// and unmade and while MPI ends. Time for which the whole job is stopped does not count.

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "parallel/mpi_environment.h"
 
 namespace af {
 namespace {
@@ -35,6 +36,55 @@ TEST(Communicator, GathersPartsInRankOrderAlsoEmptyOnes) {
   ASSERT_EQ(everywhere.size(), static_cast<std::size_t>(world.size()));
   for (std::size_t rank = 0; rank < everywhere.size(); ++rank)
     EXPECT_EQ(everywhere[rank], std::vector<std::byte>(rank, std::byte(rank)));
+}
+
+TEST(Communicator, GathersPartsOfVeryDifferentSizes) {
+  const Communicator world = Communicator::world();
+  const auto size_of = [&](int rank) { return rank == 0 ? std::size_t{3000000} : std::size_t{5}; };
+  const std::vector<std::byte> mine(size_of(world.rank()), std::byte(world.rank() + 1));
+  const auto everywhere = world.all_gather(mine);
+  for (int rank = 0; rank < world.size(); ++rank)
+    EXPECT_EQ(everywhere[static_cast<std::size_t>(rank)],
+              std::vector<std::byte>(size_of(rank), std::byte(rank + 1)));
+}
+
+// To let go of it is no collective call: the ranks that fail at different places, or at none, would
+// wait for each other for ever.
+TEST(Communicator, RanksLetGoOfNodeMemoryEachInItsOwnOrder) {
+  const Communicator world = Communicator::world();
+  const auto make = [&] {
+    return world.allocate_on_node(
+        1000, [](std::span<std::byte> bytes) { std::memset(bytes.data(), 7, bytes.size()); });
+  };
+  auto first = make();
+  auto second = make();
+  (world.rank() % 2 == 0 ? first : second).reset();
+  world.barrier();
+  EXPECT_EQ((world.rank() % 2 == 0 ? second : first).get()[999], std::byte(7));
+  try {
+    const auto mine = std::move(world.rank() % 2 == 0 ? second : first);
+    if (world.is_root()) throw FileError("a.h5", "is torn");
+  } catch (const Error&) {
+  }
+  world.barrier();
+}
+
+TEST(Communicator, NodeMemoryThatHasNoRoomIsRefusedOnEveryRank) {
+  const Communicator world = Communicator::world();
+  if (world.size() == 1) GTEST_SKIP() << "a process alone has memory of its own";
+  EXPECT_THROW(std::ignore = world.allocate_on_node(std::size_t{1} << 50, [](auto) {}), Error);
+}
+
+TEST(Communicator, ANodeIsFoundOnce) {
+  const Communicator world = Communicator::world();
+  EXPECT_EQ(&world.node().impl(), &Communicator::world().node().impl());
+}
+
+TEST(MpiEnvironment, WithoutSupportOfThreadsIsAnError) {
+  constexpr int kSingle = 0;
+  constexpr int kFunneled = 1;
+  EXPECT_THROW(require_threads(kSingle), RemoteError);
+  EXPECT_NO_THROW(require_threads(kFunneled));
 }
 
 TEST(Communicator, NodeMemoryIsFilledOnceAndSeenByAll) {

@@ -59,6 +59,21 @@ TEST(WorkQueue, FailureOfOneItemIsThrownOnEveryRank) {
   }
 }
 
+TEST(WorkQueue, FailureOfTheReportOfProgressIsThrownOnEveryRank) {
+  const Communicator world = Communicator::world();
+  const auto on_progress = [](std::int64_t) { throw FileError("progress.txt", "disk full"); };
+  try {
+    for_each_item(
+        world,
+        100,
+        [](std::int64_t) { std::this_thread::sleep_for(std::chrono::milliseconds(1)); },
+        on_progress);
+    ADD_FAILURE() << "no error on rank " << world.rank();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.exit_code(), ExitCode::File);
+  }
+}
+
 TEST(BlockSize, ShrinksTowardsTheEndAndLastsTwoSecondsAtMost) {
   // Nothing is known yet.
   EXPECT_EQ(block_size(1000000, 0, 10, 0.0), 1);

@@ -19,6 +19,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "base/host_name.h"
 
 namespace af {
 namespace {
