@@ -3,6 +3,7 @@
 
 #include <cstdlib>
 #include <map>
+#include <memory>
 #include <sstream>
 #include <type_traits>
 
@@ -25,10 +26,29 @@ bool is_given(const T& value) {
     return true;
 }
 
-/// CLI11 keeps nothing of ours beside an option.
-std::map<const CLI::Option*, Field>& bound_fields() {
-  static std::map<const CLI::Option*, Field> fields;
-  return fields;
+/// What CLI11 keeps of ours: the fields of a program's options, by command and name of the option.
+struct BoundFields : CLI::Formatter {
+  std::map<std::string, Field> of_options;
+};
+
+template <typename App>
+App& program_of(App& app) {
+  App* program = &app;
+  while (program->get_parent() != nullptr) program = program->get_parent();
+  return *program;
+}
+
+/// The program is named only when it runs; a group of options has no name.
+std::string key_of(const CLI::App& app, const CLI::Option& option) {
+  std::string key = option.get_name(true, true);
+  for (const CLI::App* command = &app; command->get_parent() != nullptr;
+       command = command->get_parent())
+    key = command->get_name() + " " + key;
+  return key;
+}
+
+std::shared_ptr<BoundFields> bound_fields(const CLI::App& app) {
+  return std::dynamic_pointer_cast<BoundFields>(program_of(app).get_formatter());
 }
 
 template <typename T>
@@ -95,12 +115,13 @@ void bind_field(CLI::App& app, const Field& field) {
         "decimal size"));
   }
   option->required(field.is_required);
-  bound_fields().insert_or_assign(option, field);
+  bound_fields(app)->of_options.insert_or_assign(key_of(owner, *option), field);
 }
 
 }  // namespace
 
 void bind_fields(CLI::App& app, const Fields& fields) {
+  if (bound_fields(app) == nullptr) program_of(app).formatter(std::make_shared<BoundFields>());
   for (const Field& field : fields)
     if (!field.option.empty()) bind_field(app, field);
   for (const Field& field : fields) {
@@ -113,9 +134,11 @@ void bind_fields(CLI::App& app, const Fields& fields) {
   }
 }
 
-const Field* bound_field(const CLI::Option& option) {
-  const auto found = bound_fields().find(&option);
-  return found == bound_fields().end() ? nullptr : &found->second;
+const Field* bound_field(const CLI::App& app, const CLI::Option& option) {
+  const auto fields = bound_fields(app);
+  if (fields == nullptr) return nullptr;
+  const auto found = fields->of_options.find(key_of(app, option));
+  return found == fields->of_options.end() ? nullptr : &found->second;
 }
 
 }  // namespace af::cli

@@ -9,8 +9,9 @@ namespace af::cli {
 /// Adds an option for every field that has one.
 void bind_fields(CLI::App& app, const Fields& fields);
 
-/// The description from which an option was made; null when it was made without one.
-const Field* bound_field(const CLI::Option& option);
+/// The description from which an option of this command, or group of options, was made; null when
+/// it was made without one. It lives as long as the program.
+const Field* bound_field(const CLI::App& app, const CLI::Option& option);
 
 /// The options of a struct that describes itself; `options` must outlive the parsing.
 template <Described T>

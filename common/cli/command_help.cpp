@@ -100,9 +100,9 @@ void add_description(const Field& field, OptionHelp& help) {
   help.is_repeated = help.is_list && !help.is_comma_separated;
 }
 
-OptionHelp option_help(const CLI::Option& option, const std::string& group) {
+OptionHelp option_help(const CLI::App& app, const CLI::Option& option, const std::string& group) {
   static const std::set<std::string> of_every_program = {
-      "--help", "--version", "--help-as", "--xml", "--list"};
+      "--help", "--version", "--help-as", "--no-lock", "--xml", "--list"};
   OptionHelp help;
   for (const std::string& name : option.get_snames()) help.names.push_back("-" + name);
   for (const std::string& name : option.get_lnames()) help.names.push_back("--" + name);
@@ -124,7 +124,7 @@ OptionHelp option_help(const CLI::Option& option, const std::string& group) {
   help.is_repeated = help.is_list && !help.is_comma_separated;
   help.depends_on_others = !option.get_needs().empty() || !option.get_excludes().empty();
   help.is_of_every_program = of_every_program.contains(help.long_name());
-  if (const Field* field = bound_field(option)) add_description(*field, help);
+  if (const Field* field = bound_field(app, option)) add_description(*field, help);
   return help;
 }
 
@@ -132,7 +132,7 @@ void add_options(const CLI::App& app, const std::string& group, CommandHelp& hel
   for (const CLI::Option* option : app.get_options()) {
     const std::string& own = option->get_group();
     if (own.empty()) continue;  // hidden
-    help.options.push_back(option_help(*option, !group.empty() ? group : own));
+    help.options.push_back(option_help(app, *option, !group.empty() ? group : own));
   }
 }
 

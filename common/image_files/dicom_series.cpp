@@ -414,7 +414,7 @@ DicomCt read_dicom_series(const fs::path& folder,
   for (const Slice& slice : slices) {
     for (const double value : read_dicom_pixels(slice.pixels)) ct.values.add(value);
     // Only now is it known that the pixels are there which the headers promise.
-    if (&slice == &slices.front()) ct.values.reserve(stored_voxels);
+    ct.values.reserve(stored_voxels);
   }
   if (!is_repaired) return ct;
   if (ct.values.non_finite_count() + ct.values.implausible_count() > 0) {

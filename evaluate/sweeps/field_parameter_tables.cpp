@@ -165,8 +165,9 @@ SweepPanel panel_of(const std::vector<PooledSetting>& pools,
                     ValueOf value_of) {
   SweepPanel panel{label, true, {}};
   const PrecomputeOptions& base = pools.front().setting;
-  for (const PooledSetting& pool : pools) {
-    const bool is_base = &pool == &pools.front();
+  for (std::size_t i = 0; i < pools.size(); ++i) {
+    const PooledSetting& pool = pools[i];
+    const bool is_base = i == 0;
     if (!is_base && std::invoke(value_of, pool.setting) == std::invoke(value_of, base)) continue;
     panel.points.push_back({static_cast<double>(std::invoke(value_of, pool.setting)),
                             pool.psnr_db.lower_quartile,

@@ -53,8 +53,8 @@ af_add_mpi_test(shared_measuring_test SOURCES mpi/shared_measuring_test.cpp LIBS
 af_add_test(
   described_options_test
   SOURCES unit/described_options_test.cpp
-  LIBS af_evaluation_program af_registration_program af_precompute_program af_drr_request af_simulated_study
-       PkgConfig::tomlplusplus)
+  LIBS af_evaluation_program af_registration_program af_precompute_program af_drr_request af_inspection af_scan_study
+       af_simulated_study PkgConfig::tomlplusplus)
 
 add_test(NAME population_program COMMAND ${PROJECT_SOURCE_DIR}/tests/checks/population_program.sh
                                          ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR}/bin)

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every option struct of every program: its description covers it, and outputs record it.
+// Every option struct of every program (checks.options sees to it): its description covers it, and
+// outputs record it.
 #include <set>
 #include <string>
 #include <toml++/toml.h>
@@ -8,6 +9,7 @@
 
 #include "evaluate/image_quality/evaluate_image_quality.h"
 #include "evaluate/image_quality/measure_held_out.h"
+#include "evaluate/population/measure_population.h"
 #include "evaluate/registration/compare_methods.h"
 #include "evaluate/registration/evaluate_registrations.h"
 #include "evaluate/registration/join_studies.h"
@@ -21,6 +23,8 @@
 #include "run/stop_request.h"
 #include "text/options_toml.h"
 #include "tools/drr/drr_request.h"
+#include "tools/inspect/inspect_run.h"
+#include "tools/scan/scan_options.h"
 #include "tools/simulate/simulate_options.h"
 
 namespace af {
@@ -129,8 +133,11 @@ using AllOptions = testing::Types<PrecomputeOptions,
                                   evaluation::ErrorBudgetOptions,
                                   evaluation::LatticeErrorsOptions,
                                   evaluation::JoinStudiesOptions,
+                                  evaluation::PopulationOptions,
                                   evaluation::ReportOptions,
                                   tools::DrrOptions,
+                                  InspectOptions,
+                                  tools::ScanOptions,
                                   tools::SimulateOptions>;
 TYPED_TEST_SUITE(DescribedOptions, AllOptions);
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/command_help.h"
 
+#include <memory>
+
 #include <CLI/CLI.hpp>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -55,6 +57,34 @@ CommandHelp shown_help() {
     bind_options(app, options);
   }
   return command_help(app);
+}
+
+/// An option that no struct describes, of a command.
+OptionHelp plain_help(CLI::App& command, CLI::App& program) {
+  int nodes = 0;
+  command.add_option("--nodes", nodes, "");
+  CommandHelp help = command_help(program);
+  if (!help.commands.empty()) help = help.commands.back();
+  for (const OptionHelp& option : help.options)
+    if (option.long_name() == "--nodes") return option;
+  return {};
+}
+
+// Options of a later program may stand where those of an earlier one stood in memory.
+TEST(CommandHelp, HasNothingOfAnotherProgramOrCommand) {
+  for (int turn = 0; turn < 20; ++turn) {
+    auto described = std::make_unique<CLI::App>("described");
+    ShownOptions options;
+    bind_options(*described, options);
+    described.reset();
+    CLI::App program{"plain"};
+    EXPECT_EQ(plain_help(program, program).constraint, "") << turn;
+  }
+  CLI::App program{"program"};
+  ShownOptions options;
+  bind_options(*program.add_subcommand("described", ""), options);
+  EXPECT_EQ(command_help(program).commands.front().options.size(), 12U);
+  EXPECT_EQ(plain_help(*program.add_subcommand("plain", ""), program).constraint, "");
 }
 
 TEST(MarkdownPage, HasARowForEveryOption) {
