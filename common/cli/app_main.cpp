@@ -25,6 +25,7 @@
 #include "cli/shell_completion.h"
 #include "cli/slicer_module.h"
 #include "cli/usage_message.h"
+#include "files/output_lock.h"
 #include "parallel/mpi_environment.h"
 #include "parallel/work_watch.h"
 #include "run/stop_request.h"
@@ -58,6 +59,16 @@ void add_help_formats(CLI::App& app) {
          "exit")
       ->check(CLI::IsMember({"markdown", "man", "bash", "zsh"}))
       ->trigger_on_parse();
+}
+
+/// For every command.
+void add_no_lock(CLI::App& app) {
+  app.add_flag_callback("--no-lock",
+                        write_without_locks,
+                        "Take no locks of outputs, and heed none (OUTPUT.lock): where the file "
+                        "system has no locks, or a job that held one on another host is gone");
+  for (CLI::App* command : app.get_subcommands([](CLI::App*) { return true; }))
+    if (!command->get_name().empty()) add_no_lock(*command);
 }
 
 /// The arguments in reverse order, as CLI11 takes them.
@@ -150,6 +161,7 @@ int app_main(CLI::App& app,
   app.name(program_name(argv[0]));
   app.set_version_flag("--version", app.get_name() + " " + std::string(program_version()));
   add_help_formats(app);
+  add_no_lock(app);
   try {
     app.parse(arguments_for(app, argc, argv));
     check_option_values(app);

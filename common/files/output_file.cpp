@@ -6,6 +6,8 @@
 #include <cstdlib>
 #include <cstring>
 #include <fcntl.h>
+#include <map>
+#include <mutex>
 #include <sys/stat.h>
 #include <system_error>
 #include <unistd.h>
@@ -118,6 +120,37 @@ void write_new_file(const fs::path& path, const std::function<void(const Descrip
   });
 }
 
+/// The locks of outputs that are announced and not yet written.
+class AnnouncedLocks {
+ public:
+  static AnnouncedLocks& instance() {
+    static AnnouncedLocks locks;
+    return locks;
+  }
+
+  void take(const fs::path& path) {
+    const std::scoped_lock lock(mutex_);
+    if (!locks_.contains(path)) locks_.emplace(path, OutputLock(path));
+  }
+  /// The lock of an output that is written now: its announced one, or a new one.
+  OutputLock of(const fs::path& path) {
+    const std::scoped_lock lock(mutex_);
+    const auto announced = locks_.extract(path);
+    return announced ? std::move(announced.mapped()) : OutputLock(path);
+  }
+
+ private:
+  std::mutex mutex_;
+  std::map<fs::path, OutputLock> locks_;
+};
+
+void announce_unlocked(const fs::path& path) {
+  const fs::path partial = partial_path(path);
+  check_output_file(path, partial);
+  announce_output_file(path);
+  announce_output_file(partial);
+}
+
 }  // namespace
 
 void check_output_file(const fs::path& path, const fs::path& partial) {
@@ -133,10 +166,8 @@ void check_output_file(const fs::path& path, const fs::path& partial) {
 }
 
 void announce_output(const fs::path& path) {
-  const fs::path partial = partial_path(path);
-  check_output_file(path, partial);
-  announce_output_file(path);
-  announce_output_file(partial);
+  announce_unlocked(path);
+  AnnouncedLocks::instance().take(path);
 }
 
 void announce_outputs(const fs::path& folder, const std::vector<std::string>& names) {
@@ -144,7 +175,7 @@ void announce_outputs(const fs::path& folder, const std::vector<std::string>& na
   if (!fs::exists(fs::symlink_status(folder, ignored))) return;
   if (!fs::is_directory(folder, ignored))
     throw FileError(folder.string(), "exists and is not a folder");
-  for (const std::string& name : names) announce_output(folder / name);
+  for (const std::string& name : names) announce_unlocked(folder / name);
 }
 
 void remove_output(const fs::path& path) {
@@ -156,6 +187,7 @@ void write_atomically(const std::filesystem::path& path,
                       const std::function<void(const std::filesystem::path& partial)>& write) {
   const fs::path partial = partial_path(path);
   check_output_file(path, partial);
+  const OutputLock lock = AnnouncedLocks::instance().of(path);
   const auto remove_partial = [&] {
     std::error_code ignored;
     fs::remove(partial, ignored);
@@ -244,7 +276,12 @@ std::string file_name_part(std::string name) {
   return name;
 }
 
-void make_output_folder(const std::filesystem::path& folder) {
+OutputLock make_output_folder(const std::filesystem::path& folder) {
+  make_folder(folder);
+  return OutputLock(folder);
+}
+
+void make_folder(const std::filesystem::path& folder) {
   if (folder.empty()) throw FileError("output folder", "its name is empty");
   std::error_code error;
   fs::create_directories(folder, error);

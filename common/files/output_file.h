@@ -8,12 +8,14 @@
 #include <string_view>
 #include <vector>
 
+#include "files/output_lock.h"
+
 namespace af {
 
 /// Writes `path` so that it appears under its name only when complete: `write` fills "PATH.partial"
 /// (with the extension kept last, for writers that choose a format by it: "a.partial.png"), which
 /// is closed, synced, renamed and its folder synced. On failure nothing remains. Throws FileError
-/// naming the path and the system's reason.
+/// naming the path and the system's reason, InputError when another job is writing it (OutputLock).
 void write_atomically(const std::filesystem::path& path,
                       const std::function<void(const std::filesystem::path& partial)>& write);
 
@@ -22,10 +24,12 @@ void write_atomically(const std::filesystem::path& path,
 /// pipe, a socket or a link that leads nowhere; InputError when it is an input (input_guard.h).
 void check_output_file(const std::filesystem::path& path, const std::filesystem::path& partial);
 
-/// Before the work: check_output_file(), and from now on the file is refused as input, too.
+/// Before the work: check_output_file(); from now on the file is refused as input, too, and other
+/// jobs are kept from writing it (OutputLock) until write_atomically() has written it or this
+/// process ends.
 void announce_output(const std::filesystem::path& path);
-/// announce_output() of files that will stand in a folder, if it exists already; FileError when it
-/// is no folder.
+/// The same, but for the lock, of files that will stand in a folder, if it exists already;
+/// FileError when it is no folder. The lock is the folder's.
 void announce_outputs(const std::filesystem::path& folder, const std::vector<std::string>& names);
 
 /// Removes a file of an earlier run, if there is one; InputError when it is an input.
@@ -72,7 +76,10 @@ std::string read_own_text_file(const std::filesystem::path& path,
 /// A name (of a case, a camera) as part of a file name: all but letters, digits, - and _ become _.
 std::string file_name_part(std::string name);
 
-/// Creates a folder with its parents, and checks that files can be made in it.
-void make_output_folder(const std::filesystem::path& folder);
+/// Creates a folder with its parents, and checks that files can be made in it. For a part of an
+/// output: a whole one is made by make_output_folder().
+void make_folder(const std::filesystem::path& folder);
+/// make_folder(), and keeps other jobs from writing there as long as the lock lives.
+[[nodiscard]] OutputLock make_output_folder(const std::filesystem::path& folder);
 
 }  // namespace af

@@ -13,6 +13,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// Locks a folder beside which the lock can stand.
+OutputLock locked(const fs::path& folder) {
+  make_folder(folder.parent_path());
+  return OutputLock(folder);
+}
+
 fs::path with_suffix(const fs::path& folder, const std::string& suffix) {
   return folder.parent_path() / (folder.filename().string() + suffix);
 }
@@ -42,7 +48,9 @@ bool is_free(const fs::path& folder) {
 }  // namespace
 
 PartialFolder::PartialFolder(const fs::path& folder, Existing existing)
-    : folder_(normal_folder(folder)), partial_(with_suffix(folder_, ".partial")) {
+    : folder_(normal_folder(folder)),
+      partial_(with_suffix(folder_, ".partial")),
+      lock_(locked(folder_)) {
   std::error_code error;
   if (!is_free(folder_)) {
     if (!fs::is_directory(folder_, error))
@@ -57,7 +65,7 @@ PartialFolder::PartialFolder(const fs::path& folder, Existing existing)
   }
   fs::remove_all(partial_, error);
   if (error) throw FileError(partial_.string(), "cannot be removed: " + error.message());
-  make_output_folder(partial_);
+  make_folder(partial_);
 }
 
 PartialFolder::~PartialFolder() {

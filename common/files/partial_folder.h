@@ -3,6 +3,8 @@
 
 #include <filesystem>
 
+#include "files/output_lock.h"
+
 namespace af {
 
 /// An output folder that appears under its name only when complete. It is filled as
@@ -11,9 +13,10 @@ class PartialFolder {
  public:
   enum class Existing { Refuse, Replace };
 
-  /// Makes an empty "FOLDER.partial" and its parents, removing one left by a killed run. Throws
-  /// InputError when FOLDER exists with content and `existing` is Refuse, FileError when the folder
-  /// cannot be made.
+  /// Makes an empty "FOLDER.partial" and its parents, removing one left by a killed run, and keeps
+  /// other jobs out (OutputLock) for as long as this lives. Throws InputError when another job is
+  /// writing FOLDER, or when it exists with content and `existing` is Refuse, FileError when the
+  /// folder cannot be made.
   PartialFolder(const std::filesystem::path& folder, Existing existing);
   ~PartialFolder();
   PartialFolder(const PartialFolder&) = delete;
@@ -30,6 +33,7 @@ class PartialFolder {
  private:
   std::filesystem::path folder_;
   std::filesystem::path partial_;
+  OutputLock lock_;
   bool committed_ = false;
 };
 

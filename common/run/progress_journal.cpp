@@ -214,7 +214,7 @@ ProgressJournal::ProgressJournal(const UnfinishedWork& work)
     : files_{work.folder, work.name}, unit_size_(work.unit_size) {
   if (work.restarts && is_there(files_.folder) && !fs::is_directory(files_.folder))
     fs::remove_all(files_.folder);
-  make_output_folder(files_.folder);
+  make_folder(files_.folder);
   try {
     open(work);
   } catch (const fs::filesystem_error& error) {

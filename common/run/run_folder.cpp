@@ -35,7 +35,7 @@ void RunFolder::open() {
   all_or_none(world_, [&] {
     if (!world_.is_root()) return;
     const fs::path parent = output_.path.has_parent_path() ? output_.path.parent_path() : ".";
-    make_output_folder(output_.files.empty() ? parent : output_.path);
+    make_folder(output_.files.empty() ? parent : output_.path);
     lock_ = std::make_unique<OutputLock>(output_.path);
   });
 }

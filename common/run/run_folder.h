@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "files/output_lock.h"
 #include "parallel/communicator.h"
-#include "run/output_lock.h"
 #include "run/progress_journal.h"
 #include "run/provenance.h"
 
@@ -33,7 +33,7 @@ class RunFolder {
 
   /// Collective. Makes the folder, and keeps other jobs out from now on. Call it once the inputs
   /// are known to be good, so that bad ones leave nothing behind, and before the work, so that an
-  /// unwritable folder does not waste it. FileError or InputError as make_output_folder() and
+  /// unwritable folder does not waste it. FileError or InputError as make_folder() and
   /// OutputLock.
   void open();
 

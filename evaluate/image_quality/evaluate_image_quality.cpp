@@ -350,7 +350,7 @@ TargetResult evaluate_target(const ImageQualityOptions& options,
                              const RunFolder& run,
                              const Communicator& world) {
   all_or_none(world, [&] {
-    if (world.is_root()) make_output_folder(target.folder);
+    if (world.is_root()) make_folder(target.folder);
   });
   const Setup setup = load(options, target, world);
   const auto [field, ray_cast] = renderers_of(options, setup, world);

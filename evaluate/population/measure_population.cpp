@@ -20,7 +20,7 @@ void write_population(const PopulationOptions& options, const PopulationReader& 
     for (PopulationGroup& group : groups_of(condition, reader.counting()))
       groups.push_back(std::move(group));
   const std::string text = population_text(groups, reader.counting());
-  std::filesystem::create_directories(options.output);
+  const OutputLock lock = make_output_folder(options.output);
   write_text_file(options.output / "population.csv", population_table(groups).to_text());
   write_text_file(options.output / "patients.csv", patients_table(groups).to_text());
   write_text_file(options.output / "intervals.csv", intervals_table(groups).to_text());

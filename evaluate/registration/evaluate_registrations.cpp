@@ -67,6 +67,7 @@ const std::set<std::string> not_of_repeats = {"--case",
                                               "--starts-only",
                                               "--only-start",
                                               "--restart",
+                                              "--no-lock",
                                               "--max-hours",
                                               "--stall-minutes",
                                               "--raycast-starts-per-interval",
@@ -283,7 +284,7 @@ void write_traces(const std::filesystem::path& folder,
   for (const CaseEvaluation& evaluation : evaluations)
     for (const auto& [renderer, traces] : evaluation.traces)
       for (const auto& [start_index, trace] : traces) {
-        make_output_folder(folder / "traces");
+        make_folder(folder / "traces");
         write_text_file(folder / trace_file(evaluation.case_name, renderer, start_index),
                         trace_table(trace).to_text());
       }
@@ -508,7 +509,7 @@ void run_registration(const RegistrationStudyOptions& options,
       if (!world.is_root()) return;
       run.begin_results();
       starts_file->add(so_far.case_name, so_far.starts.starts.view());
-      if (&study_case == &cases.back()) starts_file->finish();
+      if (evaluations.size() + 1 == cases.size()) starts_file->finish();
     };
     evaluations.push_back(
         options.poses_from.empty()

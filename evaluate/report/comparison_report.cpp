@@ -130,7 +130,7 @@ std::string success_figure(const std::vector<const EvaluationRun*>& runs,
                     "high_mm of the first interval",
                     "above 0, at most 1000",
                     plain(intervals.at(0).at("high_mm")));
-  make_output_folder(figures);
+  const OutputLock lock = make_output_folder(figures);
   draw_success_rates(
       groups, static_cast<int>(intervals.size()), width_mm, figures / "success-of-runs");
   return report_figure(figures / "success-of-runs",

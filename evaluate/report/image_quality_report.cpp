@@ -50,7 +50,7 @@ std::string joint_box_plot(const std::vector<const EvaluationRun*>& runs,
     }
     groups.push_back(std::move(group));
   }
-  make_output_folder(figures);
+  const OutputLock lock = make_output_folder(figures);
   draw_psnr_boxes(groups,
                   are_papers_setting(runs) ? PaperLevels::Shown : PaperLevels::Hidden,
                   figures / "psnr");

@@ -195,7 +195,7 @@ void run_error_budget(const ErrorBudgetOptions& options,
     require_same_starts(runs);
     const ErrorBudget budget = budget_of(runs);
     const json summary = summary_json(runs, budget);
-    make_output_folder(options.output_folder);
+    const OutputLock lock = make_output_folder(options.output_folder);
     const std::string text = markdown(summary);
     write_text_file(options.output_folder / "error-budget.md", text);
     write_text_file(options.output_folder / "error-budget.csv", budget_table(budget).to_text());

@@ -202,7 +202,8 @@ void sweep_target(const FieldParametersOptions& options,
     setting.is_restart = options.resume.restarts;
   }
   using Clock = std::chrono::steady_clock;
-  for (const PrecomputeOptions& setting : settings) {
+  for (std::size_t i = 0; i < settings.size(); ++i) {
+    const PrecomputeOptions& setting = settings[i];
     const bool is_made = !std::filesystem::exists(setting.output);
     const Clock::time_point start = Clock::now();
     SettingResult& result = results.emplace_back();
@@ -224,7 +225,7 @@ void sweep_target(const FieldParametersOptions& options,
         {{"the field", result.info.payload_sha256}, {"the CT", ct.facts.content_sha256}});
     result.comparisons =
         compare(options, field, reference, run.unfinished(field_name(setting), decides), world);
-    if (is_made && &setting == &settings.front())
+    if (is_made && i == 0)
       announce_rest(settings,
                     std::chrono::duration<double>(compared - start).count(),
                     std::chrono::duration<double>(Clock::now() - compared).count(),
@@ -334,7 +335,7 @@ void run_field_parameters(const FieldParametersOptions& options,
                 world);
   run.open();
   const std::vector<Target> targets = all_or_none(world, [&] {
-    if (world.is_root()) make_output_folder(fields);
+    if (world.is_root()) make_folder(fields);
     return targets_of(options);
   });
   Provenance provenance = {"af-evaluate field-parameters",

@@ -86,7 +86,7 @@ void write_slicer_folder(const RegistrationProblem& problem,
                          const RigidTransform& room_from_ct,
                          const StudyCase& study_case,
                          const std::filesystem::path& folder) {
-  make_output_folder(folder);
+  make_folder(folder);
   write_text_file(folder / "ct-to-room.tfm", pose_to_itk_transform(room_from_ct));
   if (!study_case.fiducials_ct_mm.empty())
     write_text_file(folder / "fiducials.mrk.json", fiducials_text(study_case.fiducials_ct_mm));

@@ -15,6 +15,12 @@ af_add_program_tests(
   PROGRAMS af-precompute af-inspect stopped_rank
   LABELS programs mpi
   TIMEOUT 1800)
+af_add_program_tests(
+  output_lock_tests EACH_TEST
+  SOURCES programs/output_locks_test.cpp support/launched_job.cpp
+  LIBS af_registration_case af_study_contents
+  PROGRAMS af-drr af-inspect af-precompute af-register af-scan af-simulate)
+
 target_compile_definitions(fault_tests PRIVATE AF_STOPPED_RANK_PROGRAM="$<TARGET_FILE:stopped_rank>")
 add_executable(stopped_rank programs/stopped_rank.cpp)
 target_link_libraries(stopped_rank PRIVATE af_compile_options af_cli)

@@ -5,19 +5,21 @@
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
 #include <sys/resource.h>
+#include <thread>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "files/output_file.h"
+#include "files/output_lock.h"
 #include "pose_files/pose_file.h"
 #include "programs/small_study.h"
-#include "run/output_lock.h"
 #include "run/stop_request.h"
 #include "study/study_file.h"
 #include "support/browser.h"
@@ -78,6 +80,17 @@ class EvaluateProgram : public testing::Test {
         ranks == 0 ? ""
                    : std::string(AF_MPIEXEC " --oversubscribe -n ") + std::to_string(ranks) + " ";
     return test::run_command(launcher + AF_PROGRAM_FOLDER "/af-evaluate " + arguments);
+  }
+  /// The words of such a command under mpirun.
+  static std::vector<std::string> on_ranks(int ranks, const std::string& arguments) {
+    std::vector<std::string> words = {AF_MPIEXEC,
+                                      "--oversubscribe",
+                                      "-n",
+                                      std::to_string(ranks),
+                                      AF_PROGRAM_FOLDER "/af-evaluate"};
+    std::istringstream rest(arguments);
+    for (std::string word; rest >> word;) words.push_back(word);
+    return words;
   }
   /// registrations.csv without its last column, the timings.
   static std::string rows_without_seconds(const std::string& folder) {
@@ -197,33 +210,59 @@ TEST_F(EvaluateProgram, RegistersAlikeOnAnyRankCount) {
   EXPECT_EQ(notes.count(first_case + ": xray AP"), 1U) << "as af-register: " << notes.dump();
 }
 
-/// How a run is cut short.
+/// How a run is cut short while its ranks stand still.
 struct Cut {
   const char* name;
-  const char* script;  ///< of bash; $launcher: mpirun's process, $OUT: what all command lines hold
-  bool is_stop;        ///< exit code 75; otherwise any but 0
+  std::function<void(test::LaunchedJob& job, const std::vector<pid_t>& ranks)> cut;
+  bool is_stop;  ///< exit code 75; otherwise any but 0
 };
 
-/// Runs $CMD in the background, waits until some registrations are kept, holds the ranks there and
-/// cuts the run short, so that it cannot be faster than the cut. Nothing of it is left when this
-/// ends.
-constexpr const char* kCutScript = R"sh(
-  ranks="^[^ ]*/af-evaluate.*$OUT"
-  eval "exec $CMD" &
-  launcher=$!
-  until [[ "$(cat "$OUT.progress"/*.records 2>/dev/null | wc -c)" -gt 4000 ]]; do
-    kill -0 $launcher || exit 99
-    sleep 0.01
-  done
-  pkill -STOP -f -- "$ranks"
-  eval "$CUT"
-  sleep 0.3
-  pkill -CONT -f -- "$ranks"
-  wait $launcher
-  status=$?
-  while pgrep -f -- "$OUT" >/dev/null; do sleep 0.02; done
-  exit $status
-)sh";
+void send(const std::vector<pid_t>& processes, int signal) {
+  for (const pid_t process : processes) kill(process, signal);
+}
+
+const Cut kCuts[] = {{"usr1", [](auto& job, const auto&) { kill(job.launcher(), SIGUSR1); }, true},
+                     {"term",
+                      [](auto& job, const auto& ranks) {
+                        kill(job.launcher(), SIGTERM);
+                        // Open MPI wakes the ranks a second before it passes the signal on.
+                        while (!job.has_ended()) {
+                          send(ranks, SIGSTOP);
+                          std::this_thread::sleep_for(std::chrono::milliseconds(20));
+                        }
+                      },
+                      false},
+                     {"rank", [](auto&, const auto& ranks) { kill(ranks.back(), SIGKILL); }, false},
+                     {"all",
+                      [](auto& job, const auto& ranks) {
+                        kill(job.launcher(), SIGKILL);
+                        send(ranks, SIGKILL);
+                      },
+                      false}};
+
+std::uint64_t record_bytes(const std::filesystem::path& progress) {
+  std::uint64_t bytes = 0;
+  std::error_code gone;
+  for (const auto& entry : std::filesystem::directory_iterator(progress, gone))
+    if (entry.path().extension() == ".records") bytes += entry.file_size(gone);
+  return bytes;
+}
+
+/// Waits until some registrations are kept, holds the ranks there, so that they cannot be faster
+/// than the cut, and cuts the run short. Its exit code, once nothing of it is left.
+int exit_code_when_cut(const Cut& cut,
+                       const std::vector<std::string>& command,
+                       const std::string& progress,
+                       const std::string& said) {
+  test::LaunchedJob job(command, said);
+  EXPECT_TRUE(job.wait_until([&] { return record_bytes(progress) > 4000; }));
+  const std::vector<pid_t> ranks = job.ranks();
+  send(ranks, SIGSTOP);
+  cut.cut(job, ranks);
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  send(ranks, SIGCONT);
+  return job.wait(std::chrono::minutes(5));
+}
 
 TEST_F(EvaluateProgram, RegistersCasesThatShareFieldsAsItDoesEachAlone) {
   Study study = read_study(path("study.toml"));
@@ -269,31 +308,14 @@ TEST_F(EvaluateProgram, GoesOnAfterAStopOrAKillOnAnotherRankCount) {
                                 "--preset paper --starts-per-interval 25 -o ";
   ASSERT_EQ(evaluate(arguments + path("whole"), 2).exit_code, 0);
   const std::string expected = rows_without_seconds("whole");
-  write_text_file(path("cut.sh"), kCutScript);
-  const Cut cuts[] = {
-      {"usr1", "kill -USR1 $launcher", true},
-      // Open MPI wakes the ranks a second before it passes the signal on.
-      {"term",
-       "kill -TERM $launcher; "
-       "while kill -0 $launcher 2>/dev/null; do pkill -STOP -f -- \"$ranks\"; sleep 0.02; done",
-       false},
-      {"rank", "kill -KILL $(pgrep -f -- \"^[^ ]*/af-evaluate.*$OUT\" | tail -n 1)", false},
-      {"all", "pkill -KILL -f -- \"$OUT\"", false}};
   for (const int ranks : {1, 2, 4})
-    for (const Cut& cut : cuts) {
+    for (const Cut& cut : kCuts) {
       const std::string out = path(std::string(cut.name) + std::to_string(ranks));
       SCOPED_TRACE(out);
-      // By the environment: command lines that hold $OUT are those of the run alone.
-      setenv("OUT", out.c_str(), 1);
-      setenv("CUT", cut.script, 1);
-      setenv("CMD",
-             (std::string(AF_MPIEXEC " --oversubscribe -n ") + std::to_string(ranks) +
-              " " AF_PROGRAM_FOLDER "/af-evaluate " + arguments + out)
-                 .c_str(),
-             1);
-      const test::ProgramRun run = test::run_command("bash " + path("cut.sh"));
-      EXPECT_EQ(run.exit_code == 75, cut.is_stop) << run.exit_code << run.output;
-      EXPECT_NE(run.exit_code, 0) << run.output;
+      const std::vector<std::string> command = on_ranks(ranks, arguments + out);
+      const int exit_code = exit_code_when_cut(cut, command, out + ".progress", path("said.txt"));
+      EXPECT_EQ(exit_code == 75, cut.is_stop) << exit_code << text("said.txt");
+      EXPECT_NE(exit_code, 0) << text("said.txt");
       EXPECT_FALSE(std::filesystem::exists(out + "/summary.json"));
       if (ranks == 1) expect_refused(evaluate(arguments + out + " --seed 2", 1), 3, "begun with 1");
       const std::uint64_t kept = test::kept_records(out + ".progress");
@@ -306,13 +328,27 @@ TEST_F(EvaluateProgram, GoesOnAfterAStopOrAKillOnAnotherRankCount) {
     }
 }
 
-TEST_F(EvaluateProgram, ASecondRunInAFolderIsRefused) {
-  const OutputLock lock(path("taken"));
-  for (const std::string& arguments :
-       {"registration --study " + path("study.toml") + fields(),
-        "similarity-curves --study " + path("study.toml") + fields(),
-        "image-quality --field " + path("LAT.af.h5") + " --ct " + path("ct.nii.gz")})
-    expect_refused(evaluate(arguments + " -o " + path("taken")), 3, "another job is writing it");
+TEST_F(EvaluateProgram, ASecondRunThatWritesTheSameIsRefused) {
+  make_runs_of_every_kind();
+  const OutputLock folder_lock(path("taken"));
+  const OutputLock file_lock(path("taken.md"));
+  const OutputLock page_lock(path("taken.html"));
+  const OutputLock study_lock(path("taken.toml"));
+  const std::string run = path("runs/registration");
+  const std::vector<std::string> commands = {
+      "registration --study " + path("study.toml") + fields() + " -o " + path("taken"),
+      "similarity-curves --study " + path("study.toml") + fields() + " -o " + path("taken"),
+      "image-quality --field " + path("LAT.af.h5") + " --ct " + path("ct.nii.gz") + " -o " +
+          path("taken"),
+      "error-budget --step a=" + run + " --step b=" + run + " -o " + path("taken"),
+      "compare " + run + " -o " + path("taken.md"),
+      "report " + run + " -o " + path("taken.html"),
+      "join-studies " + path("study.toml") + " " + path("study.toml") + " -o " +
+          path("taken.toml")};
+  for (const std::string& arguments : commands)
+    expect_refused(evaluate(arguments),
+                   3,
+                   "another job is writing it: process " + std::to_string(getpid()) + " on ");
 }
 
 /// Registrations that last some seconds, under mpirun; what it says goes to said.txt.
@@ -323,17 +359,10 @@ class BrokenRegistrations : public EvaluateProgram {
            "--preset paper --starts-per-interval 25 -o " + path(folder);
   }
   static std::vector<std::string> on_two_ranks(const std::string& folder) {
-    std::vector<std::string> words = {
-        AF_MPIEXEC, "--oversubscribe", "-n", "2", AF_PROGRAM_FOLDER "/af-evaluate"};
-    std::istringstream rest(arguments(folder) + " --stall-minutes 0.1");
-    for (std::string word; rest >> word;) words.push_back(word);
-    return words;
+    return on_ranks(2, arguments(folder) + " --stall-minutes 0.1");
   }
   static bool has_rows(const std::string& folder) {
-    std::error_code gone;
-    for (const auto& entry : std::filesystem::directory_iterator(path(folder + ".progress"), gone))
-      if (entry.path().extension() == ".records" && entry.file_size(gone) > 0) return true;
-    return false;
+    return record_bytes(path(folder + ".progress")) > 0;
   }
   static void expect_going_on(const std::string& folder) {
     const test::ProgramRun run = evaluate(arguments(folder), 2);

@@ -88,7 +88,10 @@ void convert_cameras(const InspectOptions& options, const Communicator& world) {
                             ? parse_rig(builtin_rig_text(options.rig_from[0]), options.rig_from[0])
                             : read_camera_files(options.rig_from, options.cameras, &warnings);
   for (const std::string& warning : warnings) warn(world, warning);
-  for (const auto& file : camera_files_of(rig, options.rig_to, options.output))
+  const auto files = camera_files_of(rig, options.rig_to, options.output);
+  if (!options.output.empty())
+    for (const auto& file : files) announce_output(file.path);
+  for (const auto& file : files)
     if (options.output.empty())
       std::cout << file.bytes;
     else

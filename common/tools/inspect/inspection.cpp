@@ -299,7 +299,7 @@ std::string draw_pictures(const fs::path& study_path,
                           const CtReadOptions& ct_reading,
                           const fs::path& folder) {
   const Study study = read_study(study_path);
-  make_output_folder(folder);
+  const OutputLock lock = make_output_folder(folder);
   std::string text;
   for (const StudyCase& study_case : study.cases) {
     const StudyPictures pictures =

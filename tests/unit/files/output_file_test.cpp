@@ -163,20 +163,20 @@ TEST(InputFile, IsARegularFileAndNothingIsWaitedFor) {
   EXPECT_THAT(message_for(folder.path()), HasSubstr("is a folder"));
 }
 
-TEST(MakeOutputFolder, MakesParentsAndAcceptsAnExistingFolder) {
+TEST(MakeFolder, MakesParentsAndAcceptsAnExistingFolder) {
   const ScratchFolder folder;
-  make_output_folder(folder / "a/b/c");
-  make_output_folder(folder / "a/b/c");
+  make_folder(folder / "a/b/c");
+  make_folder(folder / "a/b/c");
   EXPECT_TRUE(fs::is_directory(folder / "a/b/c"));
   EXPECT_EQ(entry_count(folder / "a/b/c"), 0U);
 }
 
-TEST(MakeOutputFolder, RefusesAFileInItsPlace) {
+TEST(MakeFolder, RefusesAFileInItsPlace) {
   const ScratchFolder folder;
   write_text_file(folder / "a", "x");
-  EXPECT_THROW(make_output_folder(folder / "a"), FileError);
-  EXPECT_THROW(make_output_folder(folder / "a/b"), FileError);
-  EXPECT_THROW(make_output_folder(""), FileError);
+  EXPECT_THROW(make_folder(folder / "a"), FileError);
+  EXPECT_THROW(make_folder(folder / "a/b"), FileError);
+  EXPECT_THROW(make_folder(""), FileError);
 }
 
 }  // namespace

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+
+namespace af {
+
+/// Keeps other jobs from writing the same output: "OUTPUT.lock" beside it, locked by the kernel
+/// (fcntl, of the open file), which lets go when this process ends, however it ends. The file says
+/// who holds it, and is removed in the end. A lock that a killed job left is taken over by a job of
+/// the same host, or of the same batch job, which was queued again; on another host nobody can tell
+/// whether its holder still runs. An output within a folder that this process has locked, or within
+/// FOLDER.partial or FOLDER.progress, needs no lock of its own. \test OutputLock.*
+class OutputLock {
+ public:
+  /// InputError that says who holds it, since when and what to do; FileError when the file cannot
+  /// be made or written, or is not a lock.
+  explicit OutputLock(const std::filesystem::path& output);
+  OutputLock(OutputLock&& other) noexcept;
+  OutputLock& operator=(OutputLock&&) = delete;
+  ~OutputLock();
+
+ private:
+  OutputLock() = default;
+  bool try_to_take(const std::filesystem::path& output);
+  bool open_file();
+
+  std::filesystem::path path_;    ///< of the lock
+  std::filesystem::path output_;  ///< absolute; empty: no lock is held
+  int descriptor_ = -1;
+};
+
+/// From now on no lock is taken or heeded (--no-lock).
+void write_without_locks();
+
+}  // namespace af
