@@ -147,6 +147,20 @@ RunDescription description_of(const RegisterOptions& in_force,
   return description;
 }
 
+/// Says how many starts were clipped, and the first of them.
+void warn_of_clipped(const std::vector<RegistrationRecord>& records, const Communicator& world) {
+  const auto is_clipped = [](const RegistrationRecord& record) {
+    return !record.result.clipped_along.empty();
+  };
+  const auto first = std::ranges::find_if(records, is_clipped);
+  if (first == records.end()) return;
+  warn(world,
+       std::to_string(std::ranges::count_if(records, is_clipped)) + " of " +
+           std::to_string(records.size()) + " starts lay outside the field's range (start " +
+           std::to_string(first->start_index) + " along " + first->result.clipped_along +
+           ") and were clipped into it");
+}
+
 void add_target_errors(const CaseToRegister& registered, std::vector<RegistrationRecord>& records) {
   if (!registered.gold.has_value()) return;
   const std::vector<Eigen::Vector3d> points = target_points(registered.of.target_box_ct);
@@ -173,6 +187,7 @@ void write_results(const RegisterOptions& options,
     best.diagnosis = diagnose_views(
         problem, best.result.start_room_from_ct, best.result.room_from_ct, best.view_values);
   warn_of(best.diagnosis.messages, world);
+  warn_of_clipped(records, world);
   const bool is_found = judgement_of(best).verdict != Verdict::NotFound;
   const std::filesystem::path slicer = options.output_folder / "slicer";
   // Before result.json: when that is there, everything is.

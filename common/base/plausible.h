@@ -4,14 +4,16 @@
 #pragma once
 
 #include <cmath>
+#include <cstdint>
 
 namespace af {
 
 inline constexpr double kMinSpacingMm = 0.01;  ///< of voxels and pixels
 inline constexpr double kMaxSpacingMm = 100.0;
-inline constexpr double kMaxCtOriginMm = 1e4;  ///< of each coordinate
-inline constexpr double kMaxHu = 1e6;          ///< int16 is clamped to; nothing is beyond this
-inline constexpr double kMaxRoomMm = 1e6;      ///< of each coordinate of points and translations
+inline constexpr double kMaxCtOriginMm = 1e4;                        ///< of each coordinate
+inline constexpr std::uint64_t kMaxVoxels = std::uint64_t{1} << 32;  ///< 8 GB of int16
+inline constexpr double kMaxHu = 1e6;      ///< int16 is clamped to; nothing is beyond this
+inline constexpr double kMaxRoomMm = 1e6;  ///< of each coordinate of points and translations
 
 /// Written so that NaN is not plausible.
 inline bool is_plausible_spacing_mm(double spacing_mm) {

@@ -39,6 +39,11 @@ View View::coarser(int factor) const {
   return coarse;
 }
 
+std::string RenderStatus::text(const View& view) const {
+  return std::to_string(rays_outside) + " of " + std::to_string(view.pixel_count()) +
+         " rays miss its planes, or attenuation lies behind or around their source";
+}
+
 Image2d render_image(const DrrRenderer& renderer,
                      const RigidTransform& room_from_ct,
                      const View& view,

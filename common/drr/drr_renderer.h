@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
 
 #include "geometry/camera_geometry.h"
 #include "geometry/rigid_transform.h"
@@ -43,9 +44,11 @@ struct PoseGradients {
 };
 
 struct RenderStatus {
-  std::int64_t rays_outside = 0;  ///< rays that miss the field's planes; their pixels are 0
+  std::int64_t rays_outside = 0;  ///< rays that the field does not hold; their pixels are 0
 
   [[nodiscard]] bool is_inside() const { return rays_outside == 0; }
+  /// "5 of 2304 rays miss its planes, or attenuation lies behind or around their source"
+  [[nodiscard]] std::string text(const View& view) const;
 };
 
 /// Scratch memory of one thread; made by the renderer it is used with.

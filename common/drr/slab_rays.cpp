@@ -25,10 +25,14 @@ std::array<Eigen::Vector3d, 4> SlabRays::corner_directions() const {
   return {first, first + right, first + down, first + right + down};
 }
 
-bool SlabRays::all_descend() const {
+bool SlabRays::all_cross() const {
   const auto corners = corner_directions();
-  return std::all_of(
-      corners.begin(), corners.end(), [](const Eigen::Vector3d& d) { return d.y() < 0.0; });
+  return source.allFinite() &&
+         std::ranges::all_of(
+             light_slab_.slabs,
+             [&](const SlabGeometry& slab) { return light_slab_.lies_before(source.y(), slab); }) &&
+         std::ranges::all_of(corners,
+                             [](const Eigen::Vector3d& d) { return d.allFinite() && d.y() < 0.0; });
 }
 
 bool SlabRays::is_inside(const Eigen::Vector3d& direction) const {
@@ -45,7 +49,7 @@ bool SlabRays::all_inside() const {
 }
 
 std::array<double, 4> SlabRays::shares_to_edges() const {
-  if (!all_descend()) return {-1.0, -1.0, -1.0, -1.0};
+  if (!all_cross()) return {-1.0, -1.0, -1.0, -1.0};
   std::array<double, 4> least = {0.5, 0.5, 0.5, 0.5};
   const auto keep = [&](std::size_t of, const GridAxis& axis, double position_mm) {
     const double distance_mm = std::min(position_mm - axis.first_mm, axis.last_mm - position_mm);
@@ -70,7 +74,7 @@ double SlabRays::share_to_edges() const {
 }
 
 std::int64_t SlabRays::count_outside() const {
-  if (all_descend() && all_inside()) return 0;
+  if (all_cross() && all_inside()) return 0;
   return blank_outside({});
 }
 

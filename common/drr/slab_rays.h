@@ -26,8 +26,10 @@ struct SlabRays {
   [[nodiscard]] Eigen::Vector3d hit(double plane_y_mm, const Eigen::Vector3d& direction) const {
     return source + (plane_y_mm - source.y()) / direction.y() * direction;
   }
-  /// Whether all rays descend: none is parallel to the planes or rises from them.
-  [[nodiscard]] bool all_descend() const;
+  /// Whether all rays cross all planes, inside or outside their rectangles: the source is before
+  /// all attenuation (LightSlab::lies_before()), none of them is parallel to the planes or rises
+  /// from them, and no number is NaN or infinite.
+  [[nodiscard]] bool all_cross() const;
   /// Whether all rays meet every plane within its rectangle. Their hits form a convex quadrilateral
   /// on each plane, so the corner rays decide.
   [[nodiscard]] bool all_inside() const;
@@ -35,7 +37,7 @@ struct SlabRays {
   /// as a share of the plane's side, at most 0.5. Below 0 when a ray is outside.
   [[nodiscard]] double share_to_edges() const;
   /// The same for each of the axes u, v, s and t, the least over the slabs; all -1 when a ray does
-  /// not descend.
+  /// not cross.
   [[nodiscard]] std::array<double, 4> shares_to_edges() const;
   /// Rays that miss a plane.
   [[nodiscard]] std::int64_t count_outside() const;
@@ -60,7 +62,7 @@ class Footprint {
                                ///< number of nodes it holds one more than the lattice
   };
 
-  /// For rays that descend.
+  /// For rays that cross.
   Footprint(const SlabGeometry& slab, const SlabRays& rays, const Needs& needs);
 
   /// The box, at least 2 x 2 nodes.

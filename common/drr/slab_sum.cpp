@@ -15,7 +15,8 @@ constexpr std::size_t kBeyond = 48;
 
 /// Linear between, or beyond, the two nodes around a coordinate.
 void place_linear_taps(double coordinate, int nodes, std::size_t i, const SumTaps& taps) {
-  const double limited = std::clamp(coordinate, -1.0, static_cast<double>(nodes));
+  // In this order NaN becomes -1.
+  const double limited = std::min(std::max(-1.0, coordinate), static_cast<double>(nodes));
   const int lower = std::clamp(static_cast<int>(std::floor(limited)), 0, nodes - 2);
   taps.first[i] = std::clamp(lower, 0, std::max(0, nodes - kSumTaps));
   for (std::size_t tap = 0; tap < kSumTaps; ++tap)

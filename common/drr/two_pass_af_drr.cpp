@@ -320,7 +320,7 @@ RenderStatus TwoPassAfDrr::render(const RigidTransform& room_from_ct,
     return rays.blank_outside(total_attenuation,
                               gradients ? gradients->planes : std::span<float>{});
   };
-  if (!rays.all_descend()) return {blank_outside()};
+  if (!rays.all_cross()) return {blank_outside()};
   const auto warp_image = select_kernel<WarpImage>(
       kernels_128::warp_image, kernels_256::warp_image, kernels_512::warp_image);
   const auto warp_moved_image = select_kernel<WarpMovedImage>(
@@ -370,7 +370,7 @@ RenderStatus TwoPassAfDrr::render_gradient_images(const RigidTransform& room_fro
         "one value per pixel of the view");
   auto& scratch = dynamic_cast<Workspace&>(workspace);
   const SlabRays rays(blender_->field_geometry(), room_from_ct, view);
-  if (!rays.all_descend()) return {rays.blank_outside(column_gradient, row_gradient)};
+  if (!rays.all_cross()) return {rays.blank_outside(column_gradient, row_gradient)};
   const auto warp_slopes = select_kernel<WarpSlopes>(
       kernels_128::warp_slopes, kernels_256::warp_slopes, kernels_512::warp_slopes);
   const NodeImages nodes =

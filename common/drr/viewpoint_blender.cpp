@@ -53,8 +53,10 @@ class ViewpointLine {
         interpolation_(interpolation) {}
 
   [[nodiscard]] ViewpointTap tap(int node) const {
-    // Nodes just outside the outermost rays can ask for a viewpoint just outside the rectangle.
-    const double coordinate = std::clamp(at_node_0_ + node * per_node_, 0.0, viewpoints_ - 1.0);
+    // Nodes just outside the outermost rays can ask for a viewpoint just outside the rectangle. In
+    // this order NaN becomes 0: the difference of two sums beyond a double's range is no number.
+    const double coordinate =
+        std::min(std::max(0.0, at_node_0_ + node * per_node_), viewpoints_ - 1.0);
     const int lower = std::min(static_cast<int>(coordinate), viewpoints_ - 2);
     const double x = coordinate - lower;
     const auto slope = static_cast<float>(per_mm_);

@@ -65,8 +65,9 @@ StoredValues stored_values(LightSlab& planes) {
     NodeRange& t = slab.stored_t;
     values.start_group("/geometry/slab_" + std::to_string(k) + "/");
     values.numbers("st_plane_y_mm", {&slab.st_plane_y_mm}, "mm", "slab");
-    values.numbers("y_range_mm", {&slab.y_low_mm, &slab.y_high_mm}, "mm", "slab").may_be_infinite =
-        true;
+    // The last slab ends where all attenuation does.
+    double& high = k + 1 < planes.slabs.size() ? slab.y_high_mm : planes.attenuation_end_y_mm;
+    values.numbers("y_range_mm", {&slab.y_low_mm, &high}, "mm", "slab").may_be_infinite = true;
     values.numbers("s_extent_mm", {&slab.s.first_mm, &slab.s.last_mm}, "mm", "slab x");
     values.numbers("t_extent_mm", {&slab.t.first_mm, &slab.t.last_mm}, "mm", "slab z");
     values.numbers("st_nodes", {&slab.s.nodes, &slab.t.nodes}, "1", "lattice");

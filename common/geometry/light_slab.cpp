@@ -29,7 +29,7 @@ std::optional<RayNodes> LightSlab::intersect(const Ray& ray_in_slab,
                                              const SlabGeometry& slab) const {
   const Eigen::Vector3d& origin = ray_in_slab.origin_point;
   const Eigen::Vector3d& direction = ray_in_slab.direction;
-  if (!(direction.y() < 0.0)) return std::nullopt;
+  if (!(direction.y() < 0.0) || !lies_before(origin.y(), slab)) return std::nullopt;
   const Eigen::Vector3d at_uv = origin + (uv_plane_y_mm - origin.y()) / direction.y() * direction;
   const Eigen::Vector3d at_st =
       origin + (slab.st_plane_y_mm - origin.y()) / direction.y() * direction;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <limits>
 #include <optional>
 #include <string>
@@ -60,6 +61,8 @@ struct LightSlab {
   GridAxis u;
   GridAxis v;
   std::vector<SlabGeometry> slabs;  ///< K of them; 1 is the paper's field
+  /// No attenuation has a greater y; infinite where that is not known.
+  double attenuation_end_y_mm = std::numeric_limits<double>::infinity();
 
   [[nodiscard]] Eigen::Vector3d viewpoint(int u_node, int v_node) const {
     return {u.position_mm(u_node), uv_plane_y_mm, v.position_mm(v_node)};
@@ -67,8 +70,14 @@ struct LightSlab {
   [[nodiscard]] Eigen::Vector3d st_point(const SlabGeometry& slab, int s_node, int t_node) const {
     return {slab.s.position_mm(s_node), slab.st_plane_y_mm, slab.t.position_mm(t_node)};
   }
-  /// Where a ray (slab frame) meets both planes; nullopt when it misses a rectangle or does not
-  /// descend in y.
+  /// Whether a slab and all attenuation lie before a source at `y_mm`. A field holds whole lines,
+  /// but rays begin at the source.
+  [[nodiscard]] bool lies_before(double y_mm, const SlabGeometry& slab) const {
+    return y_mm > slab.st_plane_y_mm &&
+           (y_mm > attenuation_end_y_mm || std::isinf(attenuation_end_y_mm));
+  }
+  /// Where a ray (slab frame) meets both planes; nullopt when it misses a rectangle, does not
+  /// descend in y, or has attenuation behind or around its origin.
   [[nodiscard]] std::optional<RayNodes> intersect(const Ray& ray_in_slab,
                                                   const SlabGeometry& slab) const;
   /// Derivative of a value as its ray's origin and direction change, from its `slopes` with respect

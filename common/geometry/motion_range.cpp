@@ -7,23 +7,39 @@
 
 namespace af {
 
+/// Of a parameter's name without its unit: "rx".
+constexpr std::size_t kNameLength = 2;
+
 MotionRange::MotionRange(double max_rotation_rad, double max_translation_mm)
     : low{Eigen::Vector3d::Constant(-max_rotation_rad),
           Eigen::Vector3d::Constant(-max_translation_mm)},
       high{Eigen::Vector3d::Constant(max_rotation_rad),
            Eigen::Vector3d::Constant(max_translation_mm)} {}
 
-bool MotionRange::contains(const PoseParameters& parameters) const {
+std::string parameter_names(const ParameterSet& parameters) {
+  std::string names;
+  for (std::size_t i = 0; i < parameters.size(); ++i)
+    if (parameters[i])
+      names.append(names.empty() ? "" : ", ").append(kParameterNames[i], kNameLength);
+  return names;
+}
+
+ParameterSet MotionRange::beyond(const PoseParameters& parameters) const {
   // A start given in degrees exactly at the limit must not fall outside by the rounding of the
   // conversion.
-  static constexpr double kRounding = 1e-12;
-  const auto is_between =
-      [](const Eigen::Vector3d& value, const Eigen::Vector3d& lowest, const Eigen::Vector3d& most) {
-        return (value.array() >= lowest.array() - kRounding).all() &&
-               (value.array() <= most.array() + kRounding).all();
-      };
-  return is_between(parameters.rotation_rad, low.rotation_rad, high.rotation_rad) &&
-         is_between(parameters.translation_mm, low.translation_mm, high.translation_mm);
+  constexpr double kRounding = 1e-12;
+  const auto is_between = [](double value, double lowest, double most) {
+    return value >= lowest - kRounding && value <= most + kRounding;
+  };
+  ParameterSet found;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto axis = static_cast<Eigen::Index>(i);
+    found[i] =
+        !is_between(parameters.rotation_rad[axis], low.rotation_rad[axis], high.rotation_rad[axis]);
+    found[i + 3] = !is_between(
+        parameters.translation_mm[axis], low.translation_mm[axis], high.translation_mm[axis]);
+  }
+  return found;
 }
 
 double MotionRange::max_rotation_rad() const {
@@ -84,7 +100,7 @@ std::string MotionRange::text() const {
     out << (i == 0   ? ""
             : i == 3 ? " degrees, "
                      : " ")
-        << std::string_view(kParameterNames[i]).substr(0, 2) << ' ' << from[i] << " to " << to[i];
+        << std::string_view(kParameterNames[i], kNameLength) << ' ' << from[i] << " to " << to[i];
     if (i + 1 == from.size()) out << " mm";
   }
   return out.str();

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <bitset>
 #include <string>
 #include <vector>
 
@@ -9,6 +10,11 @@
 #include "geometry/rigid_transform.h"
 
 namespace af {
+
+/// Some of the six parameters of a pose, in the order of kParameterNames.
+using ParameterSet = std::bitset<6>;
+/// "rx, rz, tx"
+std::string parameter_names(const ParameterSet& parameters);
 
 /// The motion box of a field: bounds of each angle and of each translation relative to its
 /// PoseFrame. The box need not hold zero, the nominal pose.
@@ -22,7 +28,11 @@ struct MotionRange {
   MotionRange(const PoseParameters& lowest, const PoseParameters& highest)
       : low(lowest), high(highest) {}
 
-  [[nodiscard]] bool contains(const PoseParameters& parameters) const;
+  /// The parameters that lie beyond their bounds.
+  [[nodiscard]] ParameterSet beyond(const PoseParameters& parameters) const;
+  [[nodiscard]] bool contains(const PoseParameters& parameters) const {
+    return beyond(parameters).none();
+  }
   /// Whether two numbers say all: max_rotation_rad() and max_translation_mm().
   [[nodiscard]] bool is_symmetric() const;
   /// Farthest from zero of any bound.

@@ -46,6 +46,9 @@ bool covers_range(const LightSlab& light_slab,
                   const PoseFrame& frame,
                   const MotionRange& range) {
   if (!covers_corners(light_slab, camera, frame, range)) return false;
+  const double lowest_mm = lowest_source_y_mm(camera, frame, range, light_slab.slab_from_ct);
+  for (const SlabGeometry& slab : light_slab.slabs)
+    if (!light_slab.lies_before(lowest_mm, slab)) return false;
   std::vector<double> planes = {light_slab.uv_plane_y_mm};
   for (const SlabGeometry& slab : light_slab.slabs) planes.push_back(slab.st_plane_y_mm);
   try {

@@ -11,8 +11,9 @@
 namespace af {
 
 /// Whether all rays of the whole detector meet every plane of the light slab within its rectangle,
-/// wherever the CT is within `range` about the nominal pose of `frame`. Computed as planes are
-/// sized (hit_extents), not from sampled poses. \test RayCoverage.SaysWhatSampledRaysSay
+/// and their source is before all attenuation, wherever the CT is within `range` about the nominal
+/// pose of `frame`. Computed as planes are sized (hit_extents), not from sampled poses. \test
+/// RayCoverage.SaysWhatSampledRaysSay
 bool covers_range(const LightSlab& light_slab,
                   const CameraGeometry& camera,
                   const PoseFrame& frame,

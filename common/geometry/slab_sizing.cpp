@@ -359,8 +359,9 @@ std::vector<PlaneExtent> hit_extents(const CameraGeometry& camera,
 
 double lowest_source_y_mm(const CameraGeometry& camera,
                           const PoseFrame& frame,
-                          const MotionRange& range) {
-  return MovingCamera(camera, frame, range).lowest_source_y();
+                          const MotionRange& range,
+                          const RigidTransform& slab_from_ct) {
+  return MovingCamera(camera, frame, range, slab_from_ct).lowest_source_y();
 }
 
 std::array<Eigen::Vector3d, 8> CtBox::corner_points() const {
@@ -385,16 +386,17 @@ LightSlab make_light_slab(const CameraGeometry& camera,
   light_slab.uv_plane_y_mm = MovingCamera(camera, frame, range).nominal_source_y_mm();
 
   std::array<Eigen::Vector3d, 8> corners = attenuating_corners_ct;
-  double highest_ct_y_mm = -kInfinity;
+  light_slab.attenuation_end_y_mm = -kInfinity;
   for (Eigen::Vector3d& corner : corners) {
     corner = light_slab.slab_from_ct * corner;
-    highest_ct_y_mm = std::max(highest_ct_y_mm, corner.y());
+    light_slab.attenuation_end_y_mm = std::max(light_slab.attenuation_end_y_mm, corner.y());
   }
-  refuse_source_inside_ct(highest_ct_y_mm, lowest_source_y_mm(camera, frame, range));
-  for (const CameraGeometry& other : more_cameras)
-    refuse_source_inside_ct(
-        highest_ct_y_mm,
-        MovingCamera(other, frame, range, light_slab.slab_from_ct).lowest_source_y());
+  const auto refuse_inside = [&](const CameraGeometry& of) {
+    refuse_source_inside_ct(light_slab.attenuation_end_y_mm,
+                            lowest_source_y_mm(of, frame, range, light_slab.slab_from_ct));
+  };
+  refuse_inside(camera);
+  for (const CameraGeometry& other : more_cameras) refuse_inside(other);
 
   std::vector<double> planes = spec.st_plane_y_mm;
   planes.push_back(light_slab.uv_plane_y_mm);

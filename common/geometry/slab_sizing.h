@@ -40,10 +40,11 @@ std::vector<PlaneExtent> extents_on_planes(const CameraGeometry& camera,
                                            std::span<const double> plane_y_mm,
                                            const RigidTransform& slab_from_ct);
 
-/// Lowest slab-frame y that the X-ray source can take while the CT moves within `range`.
+/// Lowest y that the X-ray source can take in a slab frame while the CT moves within `range`.
 double lowest_source_y_mm(const CameraGeometry& camera,
                           const PoseFrame& frame,
-                          const MotionRange& range);
+                          const MotionRange& range,
+                          const RigidTransform& slab_from_ct);
 
 /// An axis-aligned box in the ct frame (mm).
 struct CtBox {

@@ -320,12 +320,12 @@ std::string ct_frame_of_reference(const fs::path& path, const CtReadOptions& opt
 
 void require_sound_grid(const CtGrid& grid, const std::string& file) {
   std::vector<std::string> problems;
-  for (const int extent : grid.size)
-    if (extent < 2) {
-      problems.push_back("size = " + triple(grid.size) +
-                         ": must be at least 2 voxels on each axis");
-      break;
-    }
+  const auto extent = [&](std::size_t axis) { return static_cast<std::uint64_t>(grid.size[axis]); };
+  if (std::ranges::min(grid.size) < 2)
+    problems.push_back("size = " + triple(grid.size) + ": must be at least 2 voxels on each axis");
+  else if (kMaxVoxels / extent(0) / extent(1) < extent(2))  // their product could wrap
+    problems.push_back("size = " + triple(grid.size) + ": must be at most " +
+                       std::to_string(kMaxVoxels) + " voxels");
   if (!std::all_of(grid.spacing_mm.begin(), grid.spacing_mm.end(), is_plausible_spacing_mm))
     problems.push_back("spacing = " + triple(grid.spacing_mm) + " mm: " + kPlausibleSpacing);
   if (!(grid.origin_mm.cwiseAbs().maxCoeff() <= kMaxCtOriginMm))

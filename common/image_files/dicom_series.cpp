@@ -11,6 +11,7 @@
 #include <Eigen/Geometry>
 
 #include "base/error.h"
+#include "base/plausible.h"
 #include "image_files/dicom_elements.h"
 #include "image_files/dicom_pixels.h"
 #include "image_files/image_header.h"
@@ -31,7 +32,6 @@ constexpr double kUnevenMm = 0.01;
 constexpr double kMaxDriftPixels = 0.1;  ///< of a slice from the line along the normal
 constexpr double kMaxDriftMm = 0.05;
 constexpr double kMaxGantryTiltDeg = 0.01;
-constexpr std::size_t kMaxVoxels = std::size_t{1} << 32;
 
 constexpr std::string_view kMediaStorageDirectory = "1.2.840.10008.1.3.10";
 

@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "base/error.h"
+#include "base/plausible.h"
 #include "files/input_guard.h"
 #include "image_files/file_bytes.h"
 #include "image_files/image_formats.h"
@@ -14,8 +15,6 @@ namespace af {
 namespace fs = std::filesystem;
 
 namespace image_formats {
-
-constexpr std::uint64_t kMaxVoxels = std::uint64_t{1} << 32;
 
 std::uint64_t checked_payload_bytes(const fs::path& path, const ImageHeader& header) {
   std::uint64_t voxels = 1;

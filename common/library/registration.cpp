@@ -133,12 +133,11 @@ struct RegistrationCase::Impl {
   Registration run(const af::RigidTransform& start, std::int64_t start_index, bool is_diagnosed) {
     const registration::RegistrationResult result = runner->run(start, start_index);
     const auto view_values = examiner->view_values(result.room_from_ct, estimator->is_on());
-    registration::Judgement judgement = registration::judged_end(result.stop_reason, view_values);
+    registration::ViewDiagnosis diagnosis;
     if (is_diagnosed && !view_values.empty() && result.evaluations > 0)
-      judgement = registration::judgement_with(
-          judgement,
-          registration::diagnose_views(
-              problem, result.start_room_from_ct, result.room_from_ct, view_values));
+      diagnosis = registration::diagnose_views(
+          problem, result.start_room_from_ct, result.room_from_ct, view_values);
+    const auto judgement = registration::judgement_of(result, view_values, diagnosis);
     Registration found;
     found.start_index = start_index;
     found.start = library::pose_of(result.start_room_from_ct);

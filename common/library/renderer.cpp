@@ -109,10 +109,8 @@ struct Renderer::Impl {
         renderer->render(pose, view, *workspace, total_attenuation, gradients);
     give_back(std::move(workspace));
     if (status.rays_outside > 0 && outside == Outside::Throw)
-      throw af::InputError(
-          "pose " + std::to_string(number) + " = outside the field: " +
-          std::to_string(status.rays_outside) + " of " + std::to_string(view.pixel_count()) +
-          " rays miss its planes; must be within the motion range it was made for");
+      throw af::InputError("pose " + std::to_string(number) + " = outside the field: " +
+                           status.text(view) + "; must be within the motion range it was made for");
     return status.rays_outside;
   }
 

@@ -146,8 +146,17 @@ class BundleMaker {
   [[nodiscard]] Eigen::Vector3d direction_of(int column, int row) const {
     return first_ + column * column_step_ + row * row_step_;
   }
+  /// Empty, too, where its ends are not in the volume all the same, or its length is no number: the
+  /// source is so far away that they are lost in rounding, or the ray has no direction.
   [[nodiscard]] Interval inside_of(const Eigen::Vector3d& direction) const {
-    return clip_to_volume(layer_, origin_, direction, low_, high_);
+    const Interval inside = clip_to_volume(layer_, origin_, direction, low_, high_);
+    for (const double at : {inside.begin, inside.end}) {
+      const Eigen::Array3d point = origin_ + at * direction;
+      if (!(point >= 0.0).all() || !(point <= high_.array() + low_.array()).all())
+        return {0.0, 0.0};
+    }
+    if (!std::isfinite(length_mm(inside, direction))) return {0.0, 0.0};
+    return inside;
   }
   [[nodiscard]] double length_mm(const Interval& inside, const Eigen::Vector3d& direction) const {
     return (inside.end - inside.begin) * direction.cwiseProduct(mm_from_index_).norm();

@@ -76,7 +76,7 @@ bool is_admissible(const std::vector<Method>& methods, const RigidTransform& roo
   for (const Method& method : methods)
     for (const registration::RegistrationView& view : method.runner.problem().views)
       if (view.limit.has_value()
-              ? !view.limit->range.contains(parameters_from_pose(view.limit->frame, room_from_ct))
+              ? view.limit->beyond(room_from_ct).any()
               : view.renderer->rays_outside(room_from_ct, view.widest_view()) > 0)
         return false;
   return true;

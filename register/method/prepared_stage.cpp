@@ -28,8 +28,7 @@ ValueRange drr_range_at_nominal(const RegistrationProblem& problem, const Regist
       render_image(*view.renderer, problem.nominal_room_from_ct, wide, &rays_outside);
   if (rays_outside > 0)
     throw InputError(view_name(view) + "nominal_room_from_ct = a pose outside the field (" +
-                     std::to_string(rays_outside) +
-                     " rays miss its planes): must lie inside the field");
+                     RenderStatus{rays_outside}.text(wide) + "): must lie inside the field");
   const auto [low, high] = std::minmax_element(drr.pixels.begin(), drr.pixels.end());
   return {static_cast<double>(*low), static_cast<double>(*high)};
 }

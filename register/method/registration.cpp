@@ -34,7 +34,8 @@ struct ChainEnd {
   RigidTransform room_from_ct;
   double similarity = std::numeric_limits<double>::quiet_NaN();
   StopReason stop_reason = StopReason::StepBelowFinal;
-  std::size_t stage = 0;  ///< the last one searched
+  std::string pinned_along = {};  ///< RegistrationResult::pinned_along
+  std::size_t stage = 0;          ///< the last one searched
 };
 
 /// An end that the judge has valued.
@@ -111,7 +112,8 @@ struct RegistrationRunner::Impl {
   std::vector<PreparedStage> stages;         ///< of all chains and the finish, in this order
   std::optional<PreparedStage> judge;        ///< of a portfolio
   OptimizerResult search;                    ///< reused
-  std::optional<ParameterScaling> at_start;  ///< by step_points_ct, at the run's start
+  RigidTransform start;                      ///< of the run, within the motion range
+  std::optional<ParameterScaling> at_start;  ///< by step_points_ct, there
 
   void prepare();
   [[nodiscard]] std::optional<ParameterScaling> scaling_at(
@@ -134,6 +136,9 @@ struct RegistrationRunner::Impl {
                  std::int64_t start_index,
                  ChainEnd& end,
                  RegistrationResult& result);
+  /// Of the search that ended last, "" when it is not pinned.
+  [[nodiscard]] std::string pinned_along(const PoseTarget& target,
+                                         const PreparedStage& stage) const;
   /// Narrows a stage to the silhouettes at its start; false, and why in `end`, when it cannot.
   [[nodiscard]] bool narrow_at_start(PreparedStage& stage,
                                      ChainEnd& end,
@@ -171,10 +176,10 @@ struct RegistrationRunner::Impl {
   /// The correction, from an end that converged.
   void correct(std::int64_t start_index, ChainEnd& end, RegistrationResult& result);
   /// Searches the end's last stage with ray-cast DRRs, into `search`; the pose that it found.
-  RigidTransform search_by_casting(const ParameterScaling& scaling,
-                                   const SearchBudget& budget,
-                                   const ChainEnd& end,
-                                   RegistrationResult& result);
+  ChainEnd search_by_casting(const ParameterScaling& scaling,
+                             const SearchBudget& budget,
+                             const ChainEnd& end,
+                             RegistrationResult& result);
   ObjectiveValue judged(const RigidTransform& room_from_ct);
   /// NaN when inadmissible; counted in `result`.
   double judged(const RigidTransform& room_from_ct, RegistrationResult& result);
@@ -232,6 +237,12 @@ void RegistrationRunner::Impl::append_trace(std::size_t index,
                             parameters_from_pose(frame, target.pose(iteration.point))});
 }
 
+std::string RegistrationRunner::Impl::pinned_along(const PoseTarget& target,
+                                                   const PreparedStage& stage) const {
+  if (search.stop_reason != StopReason::PinnedAtLimit) return "";
+  return parameter_names(target.limits_at(search.point, stage.options.search.final_step_mm));
+}
+
 bool RegistrationRunner::Impl::run_stage(PreparedStage& stage,
                                          std::size_t index,
                                          std::int64_t start_index,
@@ -263,6 +274,7 @@ bool RegistrationRunner::Impl::run_stage(PreparedStage& stage,
     return false;
   }
   end.room_from_ct = target.pose(search.point);
+  end.pinned_along = pinned_along(target, stage);
   return is_converged(search.stop_reason);
 }
 
@@ -303,10 +315,10 @@ void RegistrationRunner::Impl::take_own_similarity(ChainEnd& end, RegistrationRe
   if (value.is_admissible) end.similarity = value.similarity;
 }
 
-RigidTransform RegistrationRunner::Impl::search_by_casting(const ParameterScaling& scaling,
-                                                           const SearchBudget& budget,
-                                                           const ChainEnd& end,
-                                                           RegistrationResult& result) {
+ChainEnd RegistrationRunner::Impl::search_by_casting(const ParameterScaling& scaling,
+                                                     const SearchBudget& budget,
+                                                     const ChainEnd& end,
+                                                     RegistrationResult& result) {
   PreparedStage& last = stages[end.stage];
   const Derivatives needs = last.optimizer->needs();
   MultiViewObjective casting = ray_cast_objective(*problem, last);
@@ -334,7 +346,11 @@ RigidTransform RegistrationRunner::Impl::search_by_casting(const ParameterScalin
   result.evaluations += search.evaluations;
   result.inadmissible += search.inadmissible;
   result.drr_count += cast.drr_count();
-  return cast.pose(search.point);
+  return {cast.pose(search.point),
+          search.value,
+          search.stop_reason,
+          pinned_along(cast, last),
+          end.stage};
 }
 
 void RegistrationRunner::Impl::correct(std::int64_t start_index,
@@ -350,21 +366,24 @@ void RegistrationRunner::Impl::correct(std::int64_t start_index,
       std::min(options.correction.max_casts, options.max_evaluations - result.evaluations),
       random_key(start_index, stages.size())};
   if (budget.max_evaluations <= 0) return;
-  const RigidTransform found = search_by_casting(*scaling, budget, end, result);
+  const ChainEnd found = search_by_casting(*scaling, budget, end, result);
   report.casts = search.evaluations;
   // By look-up, as for ends that are not corrected; this also checks that the fields hold the pose.
-  const ObjectiveValue value = stages[end.stage].objective.evaluate(found);
+  const ObjectiveValue value = stages[end.stage].objective.evaluate(found.room_from_ct);
   result.drr_count += value.drr_count;
-  if (!std::isfinite(search.value) || !value.is_admissible) return;
+  if (!std::isfinite(found.similarity) || !value.is_admissible) return;
   const RigidTransform before_last =
       search.trace.size() > 1
           ? pose_from_parameters(problem->frame(), result.trace.end()[-2].parameters)
           : end.room_from_ct;
-  report.moved_mm = mean_tre_mm(end.room_from_ct, found, problem->target_points_ct);
-  report.last_mm = mean_tre_mm(before_last, found, problem->target_points_ct);
-  report.stood_still = is_converged(search.stop_reason);
-  if (search.stop_reason == StopReason::PinnedAtLimit) end.stop_reason = StopReason::PinnedAtLimit;
-  end.room_from_ct = found;
+  report.moved_mm = mean_tre_mm(end.room_from_ct, found.room_from_ct, problem->target_points_ct);
+  report.last_mm = mean_tre_mm(before_last, found.room_from_ct, problem->target_points_ct);
+  report.stood_still = is_converged(found.stop_reason);
+  if (found.stop_reason == StopReason::PinnedAtLimit) {
+    end.stop_reason = found.stop_reason;
+    end.pinned_along = found.pinned_along;
+  }
+  end.room_from_ct = found.room_from_ct;
   end.similarity = value.similarity;
 }
 
@@ -390,7 +409,7 @@ std::vector<PortfolioEnd> RegistrationRunner::Impl::portfolio_ends(std::int64_t 
     const std::size_t begin = std::exchange(first, first + chain.stages.size());
     if (ends.empty() ? chain.from_best_end : ends.front().similarity >= chain.only_below) continue;
     PortfolioEnd end;
-    end.room_from_ct = chain.from_best_end ? ends.front().room_from_ct : result.start_room_from_ct;
+    end.room_from_ct = chain.from_best_end ? ends.front().room_from_ct : start;
     end.chain = &chain;
     run_chain(chain, begin, start_index, end, result);
     end.similarity = judged(end.room_from_ct, result);
@@ -479,6 +498,7 @@ void RegistrationRunner::Impl::run_portfolio(std::int64_t start_index, Registrat
     best.similarity = judged(best.room_from_ct, result);
   result.similarity = best.similarity;
   result.room_from_ct = best.room_from_ct;
+  result.pinned_along = best.pinned_along;
   result.stop_reason = best.similarity <= options.judge.least_value ? StopReason::NoBetterThanNoDrr
                                                                     : best.stop_reason;
 }
@@ -509,12 +529,15 @@ RegistrationResult RegistrationRunner::run(const RigidTransform& start_room_from
   result.start_room_from_ct = start_room_from_ct;
   result.room_from_ct = start_room_from_ct;
   result.similarity = std::numeric_limits<double>::quiet_NaN();
-  impl.at_start = impl.scaling_at(start_room_from_ct, impl.step_points_ct);
+  const MultiViewObjective& limits = impl.stages.front().objective;
+  result.clipped_along = parameter_names(limits.beyond_limits(start_room_from_ct));
+  impl.start = limits.nearest_within_limits(start_room_from_ct);
+  impl.at_start = impl.scaling_at(impl.start, impl.step_points_ct);
   if (impl.judge.has_value()) {
     impl.run_portfolio(start_index, result);
   } else {
     const ChainOptions& chain = impl.options.chains.front();
-    ChainEnd end{start_room_from_ct};
+    ChainEnd end{impl.start};
     if (impl.run_chain(chain, 0, start_index, end, result))
       impl.run_finish(start_index, end, result);
     impl.correct(start_index, end, result);
@@ -522,6 +545,7 @@ RegistrationResult RegistrationRunner::run(const RigidTransform& start_room_from
     result.room_from_ct = end.room_from_ct;
     result.similarity = end.similarity;
     result.stop_reason = end.stop_reason;
+    result.pinned_along = end.pinned_along;
     result.chain = chain.name;
   }
   result.seconds = std::chrono::duration<double>(Clock::now() - begin).count();

@@ -41,6 +41,9 @@ struct RegistrationResult {
   std::int64_t drr_count = 0;     ///< DRRs rendered, those of a correction included
   std::int64_t rays_outside = 0;  ///< at the start, when that is why it is inadmissible
   StopReason stop_reason = StopReason::StepBelowFinal;
+  std::string clipped_along;  ///< "rx, tz": where the start was beyond the motion range; searches
+                              ///< began at the range's edge
+  std::string pinned_along;   ///< where the motion range ends at an end that is pinned there
   /// Finishes of ends that were not chosen are left out, but for one that a later one replaced;
   /// their evaluations count.
   std::vector<TraceRow> trace;
@@ -63,6 +66,8 @@ struct RegistrationResult {
                     drr_count,
                     rays_outside,
                     stop_reason,
+                    clipped_along,
+                    pinned_along,
                     trace,
                     correction,
                     seconds);

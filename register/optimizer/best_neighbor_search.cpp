@@ -2,24 +2,16 @@
 #include "register/optimizer/best_neighbor_search.h"
 
 #include <algorithm>
-#include <array>
+#include <optional>
 
 #include "register/optimizer/search_run.h"
 
 namespace af::registration {
 namespace {
 
-constexpr int kNeighbors = 12;
-
-ScaledParameters neighbor(const ScaledParameters& point, int index, double step_mm) {
-  ScaledParameters moved = point;
-  moved[index / 2] += index % 2 == 0 ? -step_mm : step_mm;
-  return moved;
-}
-
 struct Neighborhood {
-  bool is_complete = true;  ///< false: the search has ended
-  int best_index = -1;      ///< -1: none beats the present point
+  bool is_complete = true;               ///< false: the search has ended
+  std::optional<ScaledParameters> best;  ///< none beats the present point
   double best_value = 0.0;
   bool has_inadmissible = false;
 };
@@ -27,10 +19,8 @@ struct Neighborhood {
 Neighborhood examine(SearchRun& run, double step_mm) {
   Neighborhood found;
   found.best_value = run.result().value;
-  std::array<ScaledParameters, kNeighbors> points;
-  for (int index = 0; index < kNeighbors; ++index)
-    points[static_cast<std::size_t>(index)] = neighbor(run.result().point, index, step_mm);
-  int index = 0;
+  const auto points = neighbors(run.result().point, step_mm);
+  const ScaledParameters* point = points.data();
   for (const SearchRun::Evaluation& evaluation : run.evaluate_all(points)) {
     if (evaluation.outcome == SearchRun::Outcome::Ended) {
       found.is_complete = false;
@@ -40,9 +30,9 @@ Neighborhood examine(SearchRun& run, double step_mm) {
       found.has_inadmissible = true;
     } else if (evaluation.target.value > found.best_value) {
       found.best_value = evaluation.target.value;
-      found.best_index = index;
+      found.best = *point;
     }
-    ++index;
+    ++point;
   }
   return found;
 }
@@ -59,13 +49,12 @@ void BestNeighborSearch::maximize(OptimizationTarget& target,
   for (;;) {
     const Neighborhood found = examine(run, step_mm);
     // A spent budget still keeps the best neighbour seen.
-    if (found.best_index >= 0)
-      run.accept(neighbor(result.point, found.best_index, step_mm), found.best_value);
+    if (found.best) run.accept(*found.best, found.best_value);
     run.trace(step_mm);
     if (!found.is_complete) return;
-    if (found.best_index >= 0) continue;
+    if (found.best) continue;
     if (step_mm <= options.final_step_mm) {
-      run.converge(found.has_inadmissible);
+      run.converge(found.has_inadmissible, options.final_step_mm);
       return;
     }
     step_mm = std::max(step_mm / 2.0, options.final_step_mm);

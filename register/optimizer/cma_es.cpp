@@ -149,7 +149,7 @@ void CmaEs::maximize(OptimizationTarget& target,
       adapt(constants, samples, generation, distribution);
     run.trace(distribution.largest_deviation());
     if (distribution.largest_deviation() < options.final_step_mm) {
-      run.converge(met_limit);
+      run.converge(met_limit, options.final_step_mm);
       return;
     }
   }

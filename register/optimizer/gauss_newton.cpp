@@ -109,7 +109,7 @@ void GaussNewton::maximize(OptimizationTarget& target,
     }
     run.trace(step.norm());
     if (is_last) {
-      run.converge(met_limit);
+      run.converge(met_limit, options.final_step_mm);
       return;
     }
   }

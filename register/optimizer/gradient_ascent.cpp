@@ -100,7 +100,7 @@ void GradientAscent::maximize(OptimizationTarget& target,
     run.trace(length);
     if (step.norm() >= options.final_step_mm) continue;
     if (changes.empty()) {
-      run.converge(met_limit);
+      run.converge(met_limit, options.final_step_mm);
       return;
     }
     // A memory of well-known directions gives short steps, too; therefore the gradient decides

@@ -94,7 +94,7 @@ void newton_search(OptimizationTarget& target,
     if (is_unseen) run.accept(point, at->value);
     if (is_last) {
       run.trace(step.norm());
-      run.converge(met_limit);
+      run.converge(met_limit, 0.0);
       return;
     }
     const SearchRun::Evaluation next = run.evaluate(point, options.derivatives);

@@ -21,7 +21,7 @@ struct Callback {
   SearchRun& run;
   nlopt_opt optimizer;
   double worst_value;
-  bool met_limit = false;  ///< by the latest point
+  bool met_limit = false;  ///< by a point since the best one
   bool has_ended = false;
   std::exception_ptr failure;
 };
@@ -31,17 +31,19 @@ double value_for_nlopt(unsigned /*count*/, const double* x, double* /*gradient*/
   try {
     const ScaledParameters point = Eigen::Map<const ScaledParameters>(x);
     const SearchRun::Evaluation evaluation = callback.run.evaluate(point);
-    callback.met_limit = evaluation.outcome == SearchRun::Outcome::Inadmissible;
     if (evaluation.outcome == SearchRun::Outcome::Value) {
       const double value = evaluation.target.value;
       callback.worst_value = std::min(callback.worst_value, value);
       if (value > callback.run.result().value) {
         callback.run.accept(point, value);
         callback.run.trace(0.0);
+        callback.met_limit = false;
       }
       return value;
     }
-    if (!callback.met_limit) {
+    if (evaluation.outcome == SearchRun::Outcome::Inadmissible) {
+      callback.met_limit = true;
+    } else {
       callback.has_ended = true;
       nlopt_force_stop(callback.optimizer);
     }
@@ -83,7 +85,7 @@ void NloptSearch::maximize(OptimizationTarget& target,
   nlopt_optimize(optimizer.get(), point.data(), &value);
   if (callback.failure) std::rethrow_exception(callback.failure);
   run.trace(options.final_step_mm);
-  if (!callback.has_ended) run.converge(callback.met_limit);
+  if (!callback.has_ended) run.converge(callback.met_limit, options.final_step_mm);
 }
 
 }  // namespace af::registration

@@ -75,6 +75,15 @@ const char* to_string(StopReason reason) {
   return "unknown";
 }
 
+std::array<ScaledParameters, 12> neighbors(const ScaledParameters& point, double step_mm) {
+  std::array<ScaledParameters, 12> moved;
+  for (std::size_t i = 0; i < moved.size(); ++i) {
+    moved[i] = point;
+    moved[i][static_cast<Eigen::Index>(i / 2)] += i % 2 == 0 ? -step_mm : step_mm;
+  }
+  return moved;
+}
+
 void OptimizerOptions::describe(Fields& field) {
   field("initial_step_mm", initial_step_mm, "mm: first, and with derivatives longest, step")
       .as("step")

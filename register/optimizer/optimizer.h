@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -18,8 +19,8 @@ namespace af::registration {
 enum class StopReason {
   StepBelowFinal,         ///< converged: no better point at the final step
   EvaluationBudgetSpent,  ///< max_evaluations reached
-  PinnedAtLimit,          ///< converged, but points at the final step are inadmissible
-  StartInadmissible,      ///< the start lies outside the field or its motion range
+  PinnedAtLimit,          ///< converged, but points a final step away are inadmissible
+  StartInadmissible,      ///< the field does not hold all rays of the start
   CtOutsideRoi,           ///< no CT point projects into a region of interest: steps undefined
   NonFiniteSimilarity,    ///< the similarity is NaN or infinite
   NoBetterThanNoDrr,      ///< no chain of a portfolio explains the X-rays better than no DRR
@@ -33,6 +34,9 @@ const char* to_string(StopReason reason);
 /// points by 1 mm on average (ParameterScaling).
 using ScaledParameters = Eigen::Matrix<double, 6, 1>;
 using ScaledMatrix = Eigen::Matrix<double, 6, 6>;
+
+/// The twelve points one step away from a point along one parameter, forth and back.
+std::array<ScaledParameters, 12> neighbors(const ScaledParameters& point, double step_mm);
 
 /// What an optimiser asks of its target; each value includes the ones before.
 enum class Derivatives {

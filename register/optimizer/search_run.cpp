@@ -86,8 +86,13 @@ void SearchRun::trace(double step_mm) {
   result_.trace.push_back({step_mm, result_.value, result_.evaluations, result_.point});
 }
 
-void SearchRun::converge(bool met_limit) {
-  result_.stop_reason = met_limit ? StopReason::PinnedAtLimit : StopReason::StepBelowFinal;
+void SearchRun::converge(bool met_limit, double final_step_mm) {
+  const bool is_pinned =
+      met_limit || std::ranges::any_of(neighbors(result_.point, final_step_mm),
+                                       [&](const ScaledParameters& neighbor) {
+                                         return target_.nearest_admissible(neighbor) != neighbor;
+                                       });
+  result_.stop_reason = is_pinned ? StopReason::PinnedAtLimit : StopReason::StepBelowFinal;
 }
 
 }  // namespace af::registration

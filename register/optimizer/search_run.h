@@ -43,8 +43,8 @@ class SearchRun {
   void offer(const ScaledParameters& point, double value);
   void trace(double step_mm);
   /// The search has converged: it is pinned when the points that could have been better were
-  /// inadmissible.
-  void converge(bool met_limit);
+  /// inadmissible, or when a step of `final_step_mm` along a parameter leads beyond known limits.
+  void converge(bool met_limit, double final_step_mm);
 
   [[nodiscard]] const OptimizerResult& result() const { return result_; }
 

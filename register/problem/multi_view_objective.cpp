@@ -62,17 +62,30 @@ MultiViewObjective::MultiViewObjective(std::vector<ObjectiveView> views,
   check(!views_.empty(), "an objective needs at least one view");
 }
 
-bool MultiViewObjective::is_in_range(const RigidTransform& room_from_ct) const {
-  return std::all_of(views_.begin(), views_.end(), [&](const ObjectiveView& view) {
-    return !view.limit.has_value() ||
-           view.limit->range.contains(parameters_from_pose(view.limit->frame, room_from_ct));
-  });
+ParameterSet MultiViewObjective::beyond_limits(const RigidTransform& room_from_ct) const {
+  ParameterSet found;
+  for (const ObjectiveView& view : views_)
+    if (view.limit.has_value()) found |= view.limit->beyond(room_from_ct);
+  return found;
+}
+
+RigidTransform MultiViewObjective::nearest_within_limits(const RigidTransform& room_from_ct) const {
+  // Rounding must not put it beyond the edge.
+  constexpr double kInsideShare = 1.0 - 1e-9;
+  RigidTransform nearest = room_from_ct;
+  for (const ObjectiveView& view : views_) {
+    if (!view.limit.has_value() || view.limit->beyond(nearest).none()) continue;
+    const auto& [frame, range] = *view.limit;
+    nearest = pose_from_parameters(
+        frame, range.clamped(parameters_from_pose(frame, nearest), kInsideShare));
+  }
+  return nearest;
 }
 
 void MultiViewObjective::prepare(std::span<const RigidTransform> room_from_ct) {
   poses_.clear();
   for (const RigidTransform& pose : room_from_ct)
-    poses_.push_back({is_in_range(pose), static_cast<int>(views_.size())});
+    poses_.push_back({beyond_limits(pose).none(), static_cast<int>(views_.size())});
   if (parts_.size() < poses_.size() * views_.size()) parts_.resize(poses_.size() * views_.size());
 }
 

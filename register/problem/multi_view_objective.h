@@ -19,6 +19,10 @@ namespace af::registration {
 struct MotionLimit {
   PoseFrame frame;
   MotionRange range;
+
+  [[nodiscard]] ParameterSet beyond(const RigidTransform& room_from_ct) const {
+    return range.beyond(parameters_from_pose(frame, room_from_ct));
+  }
 };
 
 /// One view as an objective sees it; the pointers' targets outlive the objective.
@@ -70,6 +74,11 @@ class MultiViewObjective {
                                  int tiles,
                                  std::vector<TileScores>& scores);
 
+  /// The parameters along which a pose is beyond the limit of any view.
+  [[nodiscard]] ParameterSet beyond_limits(const RigidTransform& room_from_ct) const;
+  /// The pose, or the one nearest to it within the limits of all views, parameter by parameter.
+  [[nodiscard]] RigidTransform nearest_within_limits(const RigidTransform& room_from_ct) const;
+
   /// Call before a search: says whether evaluations may make DRRs from node images of earlier ones
   /// (RenderWorkspace::reuse_images()). If so, values depend on earlier poses until this is called
   /// again or several poses are evaluated at once.
@@ -98,7 +107,6 @@ class MultiViewObjective {
     NormalEquations equations;  ///< or the value alone
   };
 
-  [[nodiscard]] bool is_in_range(const RigidTransform& room_from_ct) const;
   void prepare(std::span<const RigidTransform> room_from_ct);
   Scratch& scratch_of(int slot, std::size_t view);
   /// Renders a view of pose `i` and lets `compare` fill its part, unless an earlier view of the

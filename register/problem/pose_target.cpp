@@ -96,16 +96,6 @@ std::vector<Eigen::Vector3d> cell_centers(int points_per_axis) {
   return fractions;
 }
 
-/// Poses keep this share of a box's size away from its edge, so that rounding does not put them
-/// beyond it.
-constexpr double kInsideShare = 1e-9;
-
-/// The pose of a motion limit's box nearest to `room_from_ct`, parameter by parameter.
-RigidTransform clamped_pose(const MotionLimit& limit, const RigidTransform& room_from_ct) {
-  const PoseParameters parameters = parameters_from_pose(limit.frame, room_from_ct);
-  return pose_from_parameters(limit.frame, limit.range.clamped(parameters, 1.0 - kInsideShare));
-}
-
 }  // namespace
 
 PoseParameters ParameterScaling::unscaled(const ScaledParameters& point) const {
@@ -187,20 +177,20 @@ void PoseTarget::count(const ObjectiveValue& value) {
 }
 
 ScaledParameters PoseTarget::nearest_admissible(const ScaledParameters& point) const {
-  RigidTransform nearest = pose(point);
-  bool is_changed = false;
-  for (const ObjectiveView& view : objective_.views()) {
-    if (!view.limit.has_value() ||
-        view.limit->range.contains(parameters_from_pose(view.limit->frame, nearest)))
-      continue;
-    nearest = clamped_pose(*view.limit, nearest);
-    is_changed = true;
-  }
-  if (!is_changed) return point;
-  const PoseParameters parameters = parameters_from_pose(frame_, nearest);
+  const RigidTransform wanted = pose(point);
+  if (objective_.beyond_limits(wanted).none()) return point;
+  const PoseParameters parameters =
+      parameters_from_pose(frame_, objective_.nearest_within_limits(wanted));
   ScaledParameters result;
   result << parameters.rotation_rad, parameters.translation_mm;
   return result.cwiseProduct(scaling_.displacement_mm);
+}
+
+ParameterSet PoseTarget::limits_at(const ScaledParameters& point, double step_mm) const {
+  ParameterSet found;
+  for (const ScaledParameters& neighbor : neighbors(point, step_mm))
+    found |= objective_.beyond_limits(pose(neighbor));
+  return found;
 }
 
 std::optional<double> PoseTarget::evaluate(const ScaledParameters& point) {

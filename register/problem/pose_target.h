@@ -67,6 +67,9 @@ class PoseTarget final : public OptimizationTarget {
   /// Clamps to the motion ranges of all views.
   [[nodiscard]] ScaledParameters nearest_admissible(const ScaledParameters& point) const override;
 
+  /// The parameters of the views' motion ranges that end within a step of a point.
+  [[nodiscard]] ParameterSet limits_at(const ScaledParameters& point, double step_mm) const;
+
   [[nodiscard]] RigidTransform pose(const ScaledParameters& point) const;
   [[nodiscard]] std::int64_t drr_count() const { return drr_count_; }
   /// Of the latest evaluation.

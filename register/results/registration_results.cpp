@@ -108,8 +108,7 @@ std::string counts_text(const std::vector<RegistrationRecord>& records) {
 }  // namespace
 
 Judgement judgement_of(const RegistrationRecord& record) {
-  return judgement_with(judged_end(record.result.stop_reason, record.view_values),
-                        record.diagnosis);
+  return judgement_of(record.result, record.view_values, record.diagnosis);
 }
 
 bool is_better(const RegistrationRecord& a, const RegistrationRecord& b) {
@@ -479,8 +478,7 @@ std::string summary_text(const RegistrationRecord& record, const RegistrationPro
     out << "corrected   " << correction_text(*result.correction) << '\n';
   out << "stopped     " << to_string(result.stop_reason);
   if (result.stop_reason == StopReason::StartInadmissible)
-    out << " (" << result.rays_outside
-        << " rays outside the field; 0 means that the start is beyond its motion range)";
+    out << " (" << result.rays_outside << " rays outside the field)";
   out << " after " << result.evaluations << " poses (" << result.inadmissible << " inadmissible), "
       << result.drr_count << " DRRs, " << fixed_text(result.seconds, 2) << " s\n";
   return out.str();

@@ -23,10 +23,12 @@ std::string share_text(double value, double limit) {
 }
 
 /// Why the stop reason makes an end doubtful, even if no view does.
-std::optional<std::string> doubt_of(StopReason stop_reason) {
+std::optional<std::string> doubt_of(StopReason stop_reason, const std::string& pinned_along) {
   switch (stop_reason) {
     case StopReason::PinnedAtLimit:
-      return "the search ended at the limit of the field: the optimum may lie outside";
+      return (pinned_along.empty() ? "the search ended at the limit of the field"
+                                   : "the field's range ends here along " + pinned_along) +
+             ": the optimum may lie outside";
     case StopReason::EvaluationBudgetSpent:
       return "the search was not finished: --max-evaluations is spent";
     default:
@@ -38,7 +40,7 @@ std::optional<std::string> doubt_of(StopReason stop_reason) {
 std::optional<std::string> failure_of(StopReason stop_reason) {
   switch (stop_reason) {
     case StopReason::StartInadmissible:
-      return "nothing was searched: the start is outside the field or its motion range";
+      return "nothing was searched: the field does not hold all rays of the start";
     case StopReason::CtOutsideRoi:
       return "nothing was searched: no CT point projects into the region of interest at the start";
     case StopReason::NonFiniteSimilarity:
@@ -107,12 +109,14 @@ const char* to_string(Verdict verdict) {
   return "";
 }
 
-Judgement judged_end(StopReason stop_reason, std::span<const ViewValue> values) {
+Judgement judged_end(StopReason stop_reason,
+                     std::span<const ViewValue> values,
+                     const std::string& pinned_along) {
   if (const auto failure = failure_of(stop_reason); failure.has_value())
     return {Verdict::NotFound, *failure};
   const ViewSummary coarse = summary_of(values, &ViewValue::coarse);
   const ViewSummary fine = summary_of(values, &ViewValue::fine);
-  auto doubt = doubt_of(stop_reason);
+  auto doubt = doubt_of(stop_reason, pinned_along);
   if (!std::isfinite(coarse.mean) || !std::isfinite(fine.mean))
     return {Verdict::Doubtful, doubt.value_or("no X-ray has gradients to judge the pose by")};
   if (!doubt.has_value()) doubt = unjudged_view(values);

@@ -70,8 +70,11 @@ const VerdictLimits& limits_of(std::span<const ViewValue> values);
 /// share of the other views' highest value, provided that this highest value reaches the limit.
 inline constexpr double kLeastShareOfOthers = 0.5;
 
-/// The verdict from the search's stop reason and the views' values at its end.
-Judgement judged_end(StopReason stop_reason, std::span<const ViewValue> values);
+/// The verdict from the search's stop reason and the views' values at its end. `pinned_along`:
+/// RegistrationResult's.
+Judgement judged_end(StopReason stop_reason,
+                     std::span<const ViewValue> values,
+                     const std::string& pinned_along = "");
 
 /// Whether the other views agree with the pose much better than this one.
 bool disagrees(std::size_t view, std::span<const ViewValue> values);

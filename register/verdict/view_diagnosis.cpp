@@ -222,12 +222,20 @@ ViewDiagnosis diagnose_views(const std::shared_ptr<const RegistrationProblem>& p
   return diagnosis;
 }
 
-Judgement judgement_with(const Judgement& judgement, const ViewDiagnosis& diagnosis) {
-  if (diagnosis.messages.empty()) return judgement;
-  const std::string messages = joined(diagnosis.messages, "; ");
-  if (judgement.verdict == Verdict::NotFound)
-    return {Verdict::NotFound, judgement.reason + "; " + messages};
-  return {Verdict::Doubtful, messages};
+Judgement judgement_of(const RegistrationResult& result,
+                       std::span<const ViewValue> view_values,
+                       const ViewDiagnosis& diagnosis) {
+  Judgement judgement = judged_end(result.stop_reason, view_values, result.pinned_along);
+  std::vector<std::string> reasons = diagnosis.messages;
+  if (reasons.empty() || judgement.verdict != Verdict::Found)
+    reasons.insert(reasons.begin(), judgement.reason);
+  if (!diagnosis.messages.empty() && judgement.verdict == Verdict::Found)
+    judgement.verdict = Verdict::Doubtful;
+  if (!result.clipped_along.empty())
+    reasons.push_back("the start lay outside the field's range along " + result.clipped_along +
+                      " and was clipped into it");
+  judgement.reason = joined(reasons, "; ");
+  return judgement;
 }
 
 }  // namespace af::registration

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -26,8 +27,10 @@ ViewDiagnosis diagnose_views(const std::shared_ptr<const RegistrationProblem>& p
                              const RigidTransform& room_from_ct,
                              const std::vector<ViewValue>& view_values);
 
-/// The judgement of an end in the light of a diagnosis of its views: at least doubtful where that
-/// found something.
-Judgement judgement_with(const Judgement& judgement, const ViewDiagnosis& diagnosis);
+/// The judgement of a registration in the light of a diagnosis of its views: at least doubtful
+/// where that found something. Its reason also tells of a clipped start.
+Judgement judgement_of(const RegistrationResult& result,
+                       std::span<const ViewValue> view_values,
+                       const ViewDiagnosis& diagnosis);
 
 }  // namespace af::registration

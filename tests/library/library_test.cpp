@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The library from outside: its headers alone, against what the programs made (make_library_study).
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -290,6 +291,15 @@ TEST(LibraryCt, SharesVoxelsAndRefusesGridsThatAreNone) {
   CtGrid grid = ct.grid();
   grid.size[0] += 1;
   EXPECT_THROW((void)Ct::from_voxels(grid, nullptr, ct.hu()), InputError);
+  grid = ct.grid();
+  // Products of 2^64, which wraps to 0, 2^64 and 2^90.
+  for (const std::array<int, 3>& size : {std::array{1 << 22, 1 << 21, 1 << 21},
+                                         {1 << 30, 1 << 30, 16},
+                                         {1 << 30, 1 << 30, 1 << 30}}) {
+    grid.size = size;
+    EXPECT_THAT(message_of<InputError>([&] { (void)Ct::from_voxels(grid, nullptr, {}); }),
+                HasSubstr("must be at most 4294967296 voxels"));
+  }
   grid = ct.grid();
   grid.spacing_mm[1] = -1.0;
   EXPECT_THAT(message_of<InputError>([&] { (void)Ct::from_voxels(grid, nullptr, ct.hu()); }),

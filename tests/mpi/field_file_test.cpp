@@ -143,6 +143,18 @@ std::string refusal(const std::filesystem::path& path) {
   return "";
 }
 
+TEST(FieldFile, SaysWhereAllAttenuationEnds) {
+  const test::SharedFolder folder;
+  CompressedAttenuationField field = small_field();
+  for (const double end_mm : {123.25, std::numeric_limits<double>::infinity()}) {
+    field.light_slab.attenuation_end_y_mm = end_mm;
+    write(field, folder / "a.af.h5");
+    const auto read = read_field(folder / "a.af.h5", Communicator::world());
+    EXPECT_EQ(read->light_slab.attenuation_end_y_mm, end_mm);
+    EXPECT_TRUE(std::isinf(read->light_slab.slabs.back().y_high_mm));
+  }
+}
+
 TEST(FieldFile, ReadsBackWhatRanksWroteTogether) {
   const test::SharedFolder folder;
   const CompressedAttenuationField field = small_field();

@@ -6,6 +6,7 @@
 #include "register/method/presets.h"
 #include "register/registration_run.h"
 #include "support/shared_folder.h"
+#include "unit/register/method/narrow_drr.h"
 #include "unit/register/method/registration_cases.h"
 
 namespace af::registration {
@@ -84,7 +85,8 @@ TEST(RegisterStarts, KeepsTheTraceOfTheFirstWhenNoStartHasASimilarity) {
   const Communicator world = Communicator::world();
   const test::SmallCase small = test::small_case();
   for (RegistrationView& view : small.problem->views)
-    view.limit = MotionLimit{small.problem->frame(), {1e-6, 1e-6}};
+    view.renderer = std::make_shared<const test::NarrowDrr>(
+        view.renderer, small.problem->nominal_room_from_ct, 1e-6);
   RegistrationRunner runner(small.problem, quick_options());
   PoseExaminer examiner(*small.problem, 0.0);
   UncertaintyEstimator estimator(small.problem, runner.options(), {});

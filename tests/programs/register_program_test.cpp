@@ -222,7 +222,10 @@ TEST_F(RegisterProgram, ManyStartsGiveTheSameRowsOnAnyRankCount) {
       if (column != "seconds") {
         EXPECT_EQ(a.text(row, column), b.text(row, column)) << row << ' ' << column;
       }
-  EXPECT_EQ(a.text(3, "stop_reason"), "start-inadmissible");
+  EXPECT_NE(a.text(3, "stop_reason"), "start-inadmissible");
+  EXPECT_NE(shared.output.find("1 of 5 starts lay outside the field's range (start 3 along rx)"),
+            std::string::npos)
+      << shared.output;
 }
 
 TEST_F(RegisterProgram, ManyStartsGoOnAfterAStop) {
@@ -377,11 +380,39 @@ TEST_F(RegisterProgram, RefusesWhatDoesNotExist) {
   EXPECT_FALSE(fs::exists(path("refused")));
 }
 
-TEST_F(RegisterProgram, AStartOutsideTheFieldIsNotFound) {
+TEST_F(RegisterProgram, AStartOutsideTheFieldsRangeIsClippedIntoIt) {
   const test::ProgramRun run =
-      run_register(fields() + " --start-translation-mm 0,0,13 -o " + path("outside"));
+      run_register(fields() + " --start-translation-mm 0,0,13 -o " + path("clipped"));
+  const std::string said = "the start lay outside the field's range along tz";
+  expect_refused(run, 0, said);
+  EXPECT_NE(result("clipped").at("verdict_reason").get<std::string>().find(said),
+            std::string::npos);
+  EXPECT_LT(result("clipped").at("tre_mm").get<double>(), kFieldTreMm);
+}
+
+TEST_F(RegisterProgram, AnEndWhereTheFieldsRangeEndsIsDoubtfulAndSaysAlongWhat) {
+  // The gold pose is at 1.5, -2, 1 degrees and 2.5, -1.5, 2 mm.
+  for (const std::string camera : {"AP", "LAT"}) {
+    const test::ProgramRun made = test::run_command(
+        program("af-precompute") + " --study " + path("study.toml") + " --camera " + camera +
+        " --max-rotation-deg 8 --translation-range-mm tx=-8:1 --max-translation-mm 8" +
+        " --uv-nodes 24 --st-nodes 96 --codewords 1024 -o " + path(camera + "-short.af.h5"));
+    ASSERT_EQ(made.exit_code, 0) << made.output;
+  }
+  const test::ProgramRun run = run_register(fields("-short") + " -o " + path("pinned"));
+  const std::string said = "the field's range ends here along tx";
+  EXPECT_NE(run.output.find(said), std::string::npos) << run.output;
+  const nlohmann::json found = result("pinned");
+  EXPECT_EQ(found.at("stop_reason"), "pinned-at-limit");
+  EXPECT_NE(found.at("verdict"), "found");
+  EXPECT_NE(found.at("verdict_reason").get<std::string>().find(said), std::string::npos) << found;
+}
+
+TEST_F(RegisterProgram, AStartThatCannotBeSearchedIsNotFound) {
+  const std::string start = " --renderer raycast --start-translation-mm 0,0,500 -o ";
+  const test::ProgramRun run = run_register(start + path("outside"));
   expect_refused(run, 7, "verdict     not found: nothing was searched");
-  EXPECT_NE(run.output.find("start-inadmissible"), std::string::npos) << run.output;
+  EXPECT_NE(run.output.find("ct-outside-roi"), std::string::npos) << run.output;
   EXPECT_TRUE(result("outside").at("similarity").is_null());
   EXPECT_EQ(result("outside").at("verdict"), "not found");
   for (const char* name : {"outside/result.tfm", "outside/pose.toml", "outside/slicer"})
@@ -389,8 +420,7 @@ TEST_F(RegisterProgram, AStartOutsideTheFieldIsNotFound) {
   EXPECT_TRUE(fs::exists(path("outside/AP-overlay.png")));
   const test::ProgramRun by_ranks = test::run_command(
       "OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 mpirun -n 2 --oversubscribe " +
-      program("af-register") + " --study " + path("study.toml") + fields() +
-      " --start-translation-mm 0,0,13 -o " + path("outside-2"));
+      program("af-register") + " --study " + path("study.toml") + start + path("outside-2"));
   EXPECT_EQ(by_ranks.exit_code, 7) << by_ranks.output;
 }
 
@@ -502,6 +532,42 @@ TEST_F(DrrProgram, RefusesAPoseOutsideTheFieldWithTheRayCount) {
                                        " --translation-mm 0,0,200 -o " + path("outside.mha"));
   expect_refused(run, 3, "of 2304 rays miss its planes");
   EXPECT_FALSE(fs::exists(path("outside.mha")));
+}
+
+TEST_F(DrrProgram, RefusesASourceBehindOrWithinTheCt) {
+  const std::string field = "--field " + path("AP.af.h5") + " ";
+  const std::string out = " -o " + path("behind.mha");
+  const std::string said =
+      "2304 of 2304 rays miss its planes, or attenuation lies behind or around";
+  // The CT is moved onto its source and behind it.
+  for (const char* y : {"-650", "-700"})
+    expect_refused(run_drr(field + "--translation-mm=0," + y + ",0" + out), 3, said);
+  // A source behind, within and on the (s,t) plane, whose lines all lie within the field's planes.
+  CameraRig rig = read_rig(path("rig.toml"));
+  CameraGeometry& camera = rig.cameras.front();
+  camera.pixel_spacing_mm *= 0.2;
+  camera.detector_origin_point.x() *= 0.2;
+  camera.detector_origin_point.z() *= 0.2;
+  for (const double y_mm : {150.0, 20.0, 0.0, -20.0}) {
+    camera.source_point.y() = y_mm;
+    write_text_file(path("moved.toml"), rig_to_toml(rig));
+    expect_refused(run_drr(field + "--rig " + path("moved.toml") + " --camera AP" + out), 3, said);
+  }
+  EXPECT_FALSE(fs::exists(path("behind.mha")));
+}
+
+TEST_F(DrrProgram, SaysThatAPoseIsBeyondTheRangeThatTheFieldStates) {
+  const std::string field = "--field " + path("AP.af.h5") + " -o " + path("beyond.mha");
+  // Towards the source, where the field holds the rays of more than its 12 mm.
+  const test::ProgramRun beyond = run_drr(field + " --translation-mm=0,13,0");
+  EXPECT_EQ(beyond.exit_code, 0) << beyond.output;
+  EXPECT_NE(
+      beyond.output.find("1 of 1 poses lie beyond the motion range that the field states, +-8 "
+                         "degrees, +-12 mm (pose 0 along ty)"),
+      std::string::npos)
+      << beyond.output;
+  const test::ProgramRun within = run_drr(field + " --translation-mm=0,12,0");
+  EXPECT_EQ(within.output.find("beyond"), std::string::npos) << within.output;
 }
 
 /// 14 degrees about the long axis leave a field of +-8 degrees; a second one, about that angle,

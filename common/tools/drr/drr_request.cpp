@@ -46,6 +46,7 @@ struct DrrScene {
   View view;
   PoseFrame frame;
   std::shared_ptr<ThreadPool> pool;
+  std::optional<FieldIdentity> stated;  ///< of the only field, looked up for its own camera
   /// How far the camera is from the field's own, with several fields from the first one's; empty
   /// for that one.
   std::string note;
@@ -323,12 +324,14 @@ DrrScene load_scene(const DrrOptions& options, const Communicator& communicator)
     scene.view = View::whole_detector(field->camera);
     scene.frame = field->frame;
     scene.renderer = renderer_of(opened, options, scene.pool, communicator);
+    if (opened.field() && options.more_fields.empty()) scene.stated = field;
   }
   scene.source = source_of(options);
   const DrrSource& source = scene.source;
   if (source.camera.has_value()) {
     scene.view = View::whole_detector(*source.camera);
     if (field) scene.note = note_of(*source.camera, field->camera, options);
+    if (!scene.note.empty()) scene.stated.reset();
   }
   if (source.frame.has_value())
     scene.frame = *source.frame;
@@ -361,6 +364,23 @@ std::vector<RigidTransform> requested_poses(const DrrOptions& options,
   return {pose_of_deg_and_mm(scene.frame, values, "--rotation-deg, --translation-mm")};
 }
 
+/// What is odd about poses that a field's stated range does not hold; empty: nothing.
+std::string range_note(const std::optional<FieldIdentity>& stated,
+                       const std::vector<RigidTransform>& poses) {
+  if (!stated) return "";
+  std::size_t count = 0;
+  std::string first;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const ParameterSet beyond = stated->range.beyond(parameters_from_pose(stated->frame, poses[i]));
+    if (beyond.none()) continue;
+    if (count++ == 0) first = "pose " + std::to_string(i) + " along " + parameter_names(beyond);
+  }
+  if (count == 0) return "";
+  return std::to_string(count) + " of " + std::to_string(poses.size()) +
+         " poses lie beyond the motion range that the field states, " + stated->range.text() +
+         " (" + first + "): it was not made for them, though it may hold their rays";
+}
+
 /// InputError when so many DRRs fit neither into memory nor on the disk of the output.
 void require_room(std::size_t poses, const View& view, const std::filesystem::path& output) {
   const double bytes = static_cast<double>(poses) * static_cast<double>(view.pixel_count()) *
@@ -385,9 +405,9 @@ std::vector<Image2d> render_poses(const DrrRenderer& renderer,
     std::int64_t rays_outside = 0;
     drrs[i] = render_image(renderer, poses[i], view, &rays_outside);
     if (rays_outside > 0)
-      throw InputError("pose " + std::to_string(i) + " = outside the field: " +
-                       std::to_string(rays_outside) + " of " + std::to_string(view.pixel_count()) +
-                       " rays miss its planes; must be within the motion range it was made for" +
+      throw InputError("pose " + std::to_string(i) +
+                       " = outside the field: " + RenderStatus{rays_outside}.text(view) +
+                       "; must be within the motion range it was made for" +
                        (note.empty() ? "" : " (" + note + ")"));
   });
   return drrs;
@@ -488,6 +508,8 @@ void run_drr(const DrrOptions& options, const Communicator& world) {
   const DrrScene scene = load_scene(options, world);
   std::vector<std::string> notes;
   const std::vector<RigidTransform> poses = requested_poses(options, scene, notes);
+  if (const std::string text = range_note(scene.stated, poses); !text.empty())
+    notes.push_back(text);
   for (const std::string& text : notes) warn(world, text);
   if (!world.is_root()) return;
   if (!scene.note.empty()) std::cout << scene.note << '\n';

@@ -434,5 +434,26 @@ TEST(CameraDistance, IsWhatACalibrationChanged) {
   EXPECT_NE(camera_distance(finer, nominal).text().find("other pixels"), std::string::npos);
 }
 
+TEST(RayCoverage, NoPoseIsCoveredWhoseSourceComesWithinOrBehindTheAttenuation) {
+  const CameraGeometry camera = test::paper_camera();
+  const MotionRange range(0.02, 20.0);
+  const LightSlab planes = planes_of(camera, {}, range);
+  // The CT's box reaches up to 90 mm; a detector of one pixel keeps its lines within the planes.
+  CameraGeometry near = test::c_arm_camera(1, 1, 1.0);
+  near.source_point.y() = -115.0;
+  const auto is_covered = [&](double mm) {
+    return covers_range(planes, near, {}, MotionRange(0.0, mm));
+  };
+  EXPECT_TRUE(is_covered(10.0));
+  EXPECT_FALSE(is_covered(30.0));
+  EXPECT_NEAR(covered_box(planes, near, {}, MotionRange(0.0, 10.0)).max_translation_mm(),
+              25.0,
+              25.0 * kCoveredBoxTolerance);
+  near.source_point.y() = -80.0;
+  EXPECT_FALSE(is_covered(0.0));
+  near.source_point.y() = 120.0;
+  EXPECT_FALSE(is_covered(0.0));
+}
+
 }  // namespace
 }  // namespace af

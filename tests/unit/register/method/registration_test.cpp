@@ -12,6 +12,7 @@
 #include "register/method/presets.h"
 #include "register/optimizer/curvature_bounds.h"
 #include "register/problem/pose_target.h"
+#include "unit/register/method/narrow_drr.h"
 #include "unit/register/method/registration_cases.h"
 
 namespace af::registration {
@@ -41,6 +42,17 @@ RigidTransform start_near(const test::SmallCase& small) {
 void use_bins(int bins, RegistrationOptions& options) {
   for (ChainOptions& chain : options.chains)
     for (StageOptions& stage : chain.stages) stage.similarity.bins = bins;
+}
+
+/// Two stages of one measure and optimiser that suit the small case.
+RegistrationOptions two_stages(const std::string& similarity, const std::string& optimizer) {
+  RegistrationOptions options = preset_options("paper");
+  options.use_similarity(similarity);
+  options.use_optimizer(optimizer);
+  use_bins(24, options);
+  for (StageOptions& stage : options.chains[0].stages) stage.smoothing_sigma_mm = 0.0;
+  options.chains[0].stages[0].search.initial_step_mm = 3.0;
+  return options;
 }
 
 TEST(Registration, TwoViewsRecoverAKnownPose) {
@@ -105,10 +117,17 @@ TEST(Registration, RepeatsAndThreadsGiveTheSameBits) {
   }
 }
 
-TEST(Registration, AStartOutsideTheMotionRangeIsReported) {
+/// Leaves every view the rays of the nominal pose alone.
+void keep_rays_of_nominal(const RegistrationProblem& problem,
+                          std::vector<RegistrationView>& views) {
+  for (RegistrationView& view : views)
+    view.renderer =
+        std::make_shared<const test::NarrowDrr>(view.renderer, problem.nominal_room_from_ct, 1e-3);
+}
+
+TEST(Registration, AStartWhoseRaysAFieldLacksIsReported) {
   const test::SmallCase small = test::small_case();
-  for (RegistrationView& view : small.problem->views)
-    view.limit = MotionLimit{small.problem->frame(), {3.0 * kRadPerDeg, 1.0}};
+  keep_rays_of_nominal(*small.problem, small.problem->views);
   RegistrationRunner runner(small.problem, preset_options("paper"));
   const RigidTransform start = start_near(small);
   const RegistrationResult result = runner.run(start);
@@ -116,7 +135,28 @@ TEST(Registration, AStartOutsideTheMotionRangeIsReported) {
   EXPECT_EQ(result.room_from_ct.matrix(), start.matrix());
   EXPECT_TRUE(std::isnan(result.similarity));
   EXPECT_EQ(result.evaluations, 1);
-  EXPECT_EQ(result.drr_count, 0);
+  EXPECT_EQ(result.rays_outside, 1);
+}
+
+TEST(Registration, AStartOutsideTheMotionRangeIsClippedIntoIt) {
+  const test::SmallCase small = test::small_case();
+  const MotionLimit limit{small.problem->frame(), {5.0 * kRadPerDeg, 4.0}};
+  for (RegistrationView& view : small.problem->views) view.limit = limit;
+  RegistrationRunner runner(small.problem, two_stages("ncc", "gauss-newton"));
+  const auto from = [&](const std::array<double, 6>& parameters) {
+    const RigidTransform start =
+        pose_from_parameters(limit.frame, PoseParameters::from_deg_and_mm(parameters));
+    const RegistrationResult result = runner.run(start);
+    EXPECT_EQ(result.start_room_from_ct.matrix(), start.matrix());
+    EXPECT_LT(mean_distance_mm(result.room_from_ct, small.gold_room_from_ct), kFinalStepErrorMm);
+    return result;
+  };
+  const RegistrationResult outside = from({0.5, 6.0, 0.0, 1.0, -7.0, 30.0});
+  EXPECT_EQ(outside.clipped_along, "ry, ty, tz");
+  EXPECT_EQ(outside.inadmissible, 0);
+  const RegistrationResult at_edge = from({0.5, 5.0, 0.0, 1.0, -4.0, 4.0});
+  EXPECT_EQ(at_edge.clipped_along, "");
+  EXPECT_LT(mean_distance_mm(outside.room_from_ct, at_edge.room_from_ct), 1e-6);
 }
 
 TEST(Registration, AnEndAtTheLimitIsReportedAndStaysInside) {
@@ -129,6 +169,21 @@ TEST(Registration, AnEndAtTheLimitIsReportedAndStaysInside) {
   EXPECT_EQ(result.stop_reason, StopReason::PinnedAtLimit);
   EXPECT_GT(result.inadmissible, 0);
   EXPECT_TRUE(limit.range.contains(parameters_from_pose(limit.frame, result.room_from_ct)));
+}
+
+TEST(Registration, EveryOptimizerSaysAlongWhatTheRangeEndsWhereItIsPinned) {
+  const test::SmallCase small = test::small_case();
+  // The gold pose is at 2.5 mm along x, and far within all other bounds.
+  MotionLimit limit{small.problem->frame(), {8.0 * kRadPerDeg, 8.0}};
+  limit.range.high.translation_mm.x() = 1.0;
+  for (RegistrationView& view : small.problem->views) view.limit = limit;
+  for (const std::string& optimizer : optimizer_names()) {
+    RegistrationRunner runner(small.problem, two_stages("ncc", optimizer));
+    const RegistrationResult result = runner.run(small.problem->nominal_room_from_ct);
+    EXPECT_EQ(result.stop_reason, StopReason::PinnedAtLimit) << optimizer;
+    EXPECT_EQ(result.pinned_along, "tx") << optimizer;
+    EXPECT_TRUE(limit.beyond(result.room_from_ct).none()) << optimizer;
+  }
 }
 
 TEST(Registration, ACtFarFromTheRegionsIsReported) {
@@ -212,17 +267,6 @@ TEST(RegistrationOptions, RefuseAnOptimizerThatItsMeasureCannotServe) {
   EXPECT_EQ(problems(options).size(), 2U);
   options.use_similarity("mi");
   EXPECT_TRUE(problems(options).empty());
-}
-
-/// Two stages of one measure and optimiser that suit the small case.
-RegistrationOptions two_stages(const std::string& similarity, const std::string& optimizer) {
-  RegistrationOptions options = preset_options("paper");
-  options.use_similarity(similarity);
-  options.use_optimizer(optimizer);
-  use_bins(24, options);
-  for (StageOptions& stage : options.chains[0].stages) stage.smoothing_sigma_mm = 0.0;
-  options.chains[0].stages[0].search.initial_step_mm = 3.0;
-  return options;
 }
 
 TEST(Registration, EveryOptimizerRecoversAKnownPose) {
@@ -379,8 +423,7 @@ TEST(Registration, AChainCanStartFromTheBestEndSoFar) {
 
 TEST(Registration, AChainFromTheBestEndIsLeftOutWhereThereIsNone) {
   const test::SmallCase small = test::small_case();
-  for (RegistrationView& view : small.problem->views)
-    view.limit = MotionLimit{small.problem->frame(), {3.0 * kRadPerDeg, 1.0}};
+  keep_rays_of_nominal(*small.problem, small.problem->views);
   RegistrationOptions options = two_stages("ncc", "gauss-newton");
   options.chains.push_back(options.chains[0]);
   options.chains.back().from_best_end = true;

@@ -16,8 +16,17 @@ class FunctionTarget final : public registration::OptimizationTarget {
   using Value = std::function<std::optional<double>(const registration::ScaledParameters&)>;
   using Equations = std::function<registration::TargetValue(const registration::ScaledParameters&)>;
 
-  explicit FunctionTarget(Value value, Equations equations = {})
-      : value_(std::move(value)), equations_(std::move(equations)) {}
+  using Nearest =
+      std::function<registration::ScaledParameters(const registration::ScaledParameters&)>;
+
+  /// `nearest`: the known limits; none where there are none.
+  explicit FunctionTarget(Value value, Equations equations = {}, Nearest nearest = {})
+      : value_(std::move(value)), equations_(std::move(equations)), nearest_(std::move(nearest)) {}
+
+  [[nodiscard]] registration::ScaledParameters nearest_admissible(
+      const registration::ScaledParameters& point) const override {
+    return nearest_ ? nearest_(point) : point;
+  }
 
   std::optional<double> evaluate(const registration::ScaledParameters& point) override {
     points.push_back(point);
@@ -38,6 +47,7 @@ class FunctionTarget final : public registration::OptimizationTarget {
  private:
   Value value_;
   Equations equations_;
+  Nearest nearest_;
 };
 
 }  // namespace af::test

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // What all optimisers must do, and what each is for.
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 
 #include <gtest/gtest.h>
 
@@ -44,6 +46,21 @@ test::FunctionTarget quadratic(double condition, double limit = 1e300) {
     return TargetValue{0.0, matrix * (quadratic_optimum() - p), matrix};
   };
   return test::FunctionTarget(value, equations);
+}
+
+/// quadratic() within known limits: no parameter may be above `wall`.
+test::FunctionTarget walled_quadratic(const ScaledParameters& wall) {
+  const auto free = std::make_shared<test::FunctionTarget>(quadratic(4.0));
+  const auto nearest = [=](const ScaledParameters& p) -> ScaledParameters {
+    return p.cwiseMin(wall);
+  };
+  const auto value = [=](const ScaledParameters& p) {
+    return nearest(p) == p ? free->evaluate(p) : std::nullopt;
+  };
+  const auto equations = [=](const ScaledParameters& p) {
+    return *free->evaluate_with(p, Derivatives::NormalEquations);
+  };
+  return test::FunctionTarget(value, equations, nearest);
 }
 
 OptimizerResult search(const std::string& name,
@@ -97,6 +114,25 @@ TEST_P(EveryOptimizer, NeverEndsAtAnInadmissiblePoint) {
   EXPECT_LE(result.point.norm(), kLimit);
   EXPECT_GT(result.inadmissible, 0);
   EXPECT_GT(result.value, *quadratic(4.0).evaluate(ScaledParameters::Zero()));
+}
+
+TEST_P(EveryOptimizer, SaysThatItIsPinnedAtAWall) {
+  // The optimum lies beyond the wall along the first and the fourth parameter.
+  constexpr double kWall = 2.0;
+  ScaledParameters wall = ScaledParameters::Constant(1e300);
+  wall[0] = wall[3] = kWall;
+  test::FunctionTarget target = walled_quadratic(wall);
+  const OptimizerResult result = search(GetParam(), target);
+  EXPECT_EQ(result.stop_reason, StopReason::PinnedAtLimit);
+  EXPECT_EQ(result.point.cwiseMin(wall), result.point);
+  // As near as FindsAQuadraticsMaximum asks for: models end early at a cliff.
+  EXPECT_GT(std::max(result.point[0], result.point[3]), kWall - 10.0 * kFinalStepMm);
+}
+
+TEST_P(EveryOptimizer, IsNotPinnedNearAWallThatItDoesNotWantToCross) {
+  const ScaledParameters wall = quadratic_optimum().cwiseMax(0.0).array() + 40.0 * kFinalStepMm;
+  test::FunctionTarget target = walled_quadratic(wall);
+  EXPECT_EQ(search(GetParam(), target).stop_reason, StopReason::StepBelowFinal);
 }
 
 TEST_P(EveryOptimizer, StopsAtAValueThatIsNotFinite) {

@@ -50,6 +50,27 @@ TEST(Judgement, WhatWasNotSearchedIsNotFoundWhateverItsValue) {
   EXPECT_EQ(verdict_of({{0.1, 0.1}}, StopReason::PinnedAtLimit), Verdict::NotFound);
 }
 
+TEST(Judgement, SaysWhereTheRangeEndsAndWhereTheStartWasClipped) {
+  const std::vector<ViewValue> good = {{0.9, 0.9}, {0.9, 0.9}};
+  RegistrationResult result;
+  result.stop_reason = StopReason::PinnedAtLimit;
+  result.pinned_along = "rx, rz, tx";
+  const std::string ends =
+      "the field's range ends here along rx, rz, tx: the optimum may lie outside";
+  EXPECT_EQ(judgement_of(result, good, {}).reason, ends);
+  // What a diagnosis finds does not replace it.
+  const ViewDiagnosis diagnosis{{"view 'B' does not agree"}};
+  EXPECT_EQ(judgement_of(result, good, diagnosis).reason, ends + "; view 'B' does not agree");
+  EXPECT_EQ(judgement_of(result, good, diagnosis).verdict, Verdict::Doubtful);
+  result = RegistrationResult();
+  result.clipped_along = "ry";
+  const Judgement clipped = judgement_of(result, good, {});
+  EXPECT_EQ(clipped.verdict, Verdict::Found);
+  EXPECT_TRUE(clipped.reason.ends_with(
+      "; the start lay outside the field's range along ry and was clipped into it"))
+      << clipped.reason;
+}
+
 TEST(Judgement, AViewThatCannotBeJudgedLeavesADoubt) {
   const double nan = std::nan("");
   EXPECT_EQ(verdict_of({{nan, nan}, {0.6, 0.5}}), Verdict::Doubtful);
