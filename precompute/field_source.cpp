@@ -141,7 +141,7 @@ FieldSource load_source(const PrecomputeOptions& options, const Communicator& co
   source.volume = options.is_of_bone() ? bone_per_node(*ct.volume, communicator) : ct.volume;
   source.ct_path = named.ct_path;
   source.ct_reading = named.ct_reading;
-  source.ct_content_sha256 = ct.facts.content_sha256;
+  source.ct = ct.facts.identity;
   source.frame = frame_of(named, options, ct.facts.grid);
   source.isocenter_point = named.rig.isocenter_point;
   source.range = all_or_none(communicator, [&] { return options.range(); });

@@ -13,6 +13,7 @@
 #include "precompute/measured_views.h"
 #include "precompute/plan/precompute_options.h"
 #include "volume/attenuation_volume.h"
+#include "volume/ct_identity.h"
 #include "volume/ct_read_options.h"
 
 namespace af {
@@ -23,7 +24,7 @@ struct FieldSource {
   std::shared_ptr<const AttenuationVolume> volume;
   std::string ct_path;
   CtReadOptions ct_reading;  ///< in force: typed, or the study's
-  std::string ct_content_sha256;
+  CtIdentity ct;
   CameraGeometry camera;
   PoseFrame frame;
   Eigen::Vector3d isocenter_point = Eigen::Vector3d::Zero();  ///< of the rig

@@ -365,7 +365,8 @@ class PrecomputeRun {
     TrainingCheckpoints checkpoints;
     WorkNote note(iteration(0));
     if (build.progress != nullptr) {
-      decides.merge(deciding_options(options_, kCodebookStage));
+      const OptionTexts of_codebook = deciding_options(options_, kCodebookStage);
+      decides.insert(of_codebook.begin(), of_codebook.end());
       journal.emplace(run_.unfinished("training", decides), options_.codebook_options(), world_);
       checkpoints.begun = journal->begun();
       checkpoints.on_iteration = [&](const TrainedCodebook& so_far) {
@@ -443,7 +444,7 @@ class PrecomputeRun {
     return {source.camera,
             source.frame,
             range,
-            source.ct_content_sha256,
+            source.ct,
             model.mu_water_per_mm,
             model.air_below_hu,
             options_.is_of_bone() ? FieldMaterial::Bone : FieldMaterial::All};
@@ -492,9 +493,9 @@ class PrecomputeRun {
                              to_toml(recorded),
                              options_.seed,
                              world_.size(),
-                             {{source_.ct_path, source_.ct_content_sha256}}};
+                             {{source_.ct_path, source_.ct}}};
     if (source_.projections != nullptr)
-      provenance.input_sha256[source_.projections->path] = source_.projections->content_sha256;
+      provenance.inputs[source_.projections->path] = source_.projections->content_sha256;
     nlohmann::json json = to_json(provenance);
     if (source_.projections != nullptr)
       json["projections"] = {{"views", source_.projections->views.size()},

@@ -63,7 +63,7 @@ void read_images(const StudyView& study_view, RegistrationView& view, LoadedCase
   loaded.input_notes["xray " + study_view.camera] = xray.note;
   for (std::string& warning : xray.warnings) loaded.warnings.push_back(std::move(warning));
   const auto note_hash = [&](const char* kind, const std::filesystem::path& path) {
-    loaded.input_sha256[kind + (" " + study_view.camera)] = sha256_of_file(path.string());
+    loaded.inputs[kind + (" " + study_view.camera)] = sha256_of_file(path.string());
   };
   note_hash("xray", study_view.xray);
   if (study_view.mask) note_hash("mask", *study_view.mask);
@@ -148,13 +148,14 @@ void require_field_of_case(const OpenedField& opened,
   const FieldIdentity& identity = opened.identity();
   const std::string path = opened.path().string();
   require_same_attenuation(identity, options, path);
-  if (ct.has_value() && ct->content_sha256 != identity.ct_content_sha256)
-    throw FileError(path,
-                    "CT of the field (ct_content_sha256)",
-                    ct->content_sha256 + " (" + study_case.ct.string() + ", read " +
-                        how(ct_reading_in_force(options.ct, study_case.ct_reading)) + ")",
-                    identity.ct_content_sha256 + " (read " +
-                        how(ct_reading_of(opened.info().provenance.options_toml)) + ")");
+  if (ct.has_value())
+    require_same_ct(
+        path,
+        ct->identity,
+        study_case.ct.string() + ", read " +
+            how(ct_reading_in_force(options.ct, study_case.ct_reading)) +
+            " (the field's: " + how(ct_reading_of(opened.info().provenance.options_toml)) + ")",
+        identity.ct);
 }
 
 /// Collective. Rank 0's box on every rank: processors may differ in its last bits.
@@ -233,6 +234,7 @@ void use_fields(const StudyCase& study_case,
                 const std::optional<CtFacts>& ct,
                 RegistrationProblem& problem,
                 LoadedCase& loaded) {
+  CtIdentity of_first_field;
   for (std::size_t i = 0; i < problem.views.size(); ++i) {
     RegistrationView& view = problem.views[i];
     const std::string path = all_or_none(communicator, [&] {
@@ -243,15 +245,20 @@ void use_fields(const StudyCase& study_case,
         naming_study_line(is_of_study ? study_case.views[i].places : StudyPlaces(), "field", [&] {
           return field_of_view(path, study_case, options, ct, problem, view.view, communicator);
         });
+    const CtIdentity& of_field = field->opened.identity().ct;
+    if (i == 0) of_first_field = of_field;
+    all_or_none(communicator, [&] {
+      require_same_ct(path, of_first_field, "that of the first field", of_field);
+    });
     const std::string name = "field " + view.view.camera.name;
-    if (field->bone_sha256) loaded.input_sha256["bone " + name] = *field->bone_sha256;
+    if (field->bone_sha256) loaded.inputs["bone " + name] = *field->bone_sha256;
     const FieldRenderers& renderers = field->renderers;
     view.renderer = renderers.levels.front();
     for (std::size_t level = 0; level < renderers.blur_sigma_mm.size(); ++level)
       view.coarse_levels.push_back({renderers.levels[level + 1], renderers.blur_sigma_mm[level]});
     loaded.input_notes[name] = limit_to_rays(field->opened, problem.frame(), communicator, view) +
                                "; level 0 is looked up by " + renderers.look_up;
-    loaded.input_sha256[name] = field->opened.info().payload_sha256;
+    loaded.inputs[name] = field->opened.info().payload_sha256;
   }
 }
 
@@ -313,7 +320,7 @@ LoadedCase load_case(const Study& study,
   problem->isocenter_point = study.rig.isocenter_point;
   all_or_none(communicator, [&] {
     require_known_field_cameras(study_case, options);
-    loaded.input_sha256["case"] = case_sha256(study, study_case);
+    loaded.inputs["case"] = case_sha256(study, study_case);
   });
   problem->views = read_views(study, study_case, options.fiducial_mask_mm, communicator, loaded);
 
@@ -348,7 +355,7 @@ LoadedCase load_case(const Study& study,
   }
 
   if (ct.has_value()) {
-    loaded.input_sha256["ct"] = ct->content_sha256;
+    loaded.inputs["ct"] = ct->identity;
     loaded.input_notes["ct"] =
         "read " + how(ct_reading_in_force(options.ct, study_case.ct_reading));
     problem->scaling_points_ct = ct_lattice_points(ct->grid);

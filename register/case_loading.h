@@ -13,6 +13,7 @@
 #include "image_files/ct_reader.h"
 #include "parallel/communicator.h"
 #include "register/method/registration.h"
+#include "run/input_identity.h"
 #include "study/study_file.h"
 #include "volume/ray_caster.h"
 
@@ -54,8 +55,8 @@ struct CaseLoadOptions {
 
 struct LoadedCase {
   std::shared_ptr<const RegistrationProblem> problem;
-  std::map<std::string, std::string> input_sha256;  ///< "ct", "field A", "xray A", ...
-  std::map<std::string, std::string> input_notes;   ///< how each was read: "xray A", ...; rank 0
+  InputIdentities inputs;                          ///< "ct", "field A", "xray A", ...
+  std::map<std::string, std::string> input_notes;  ///< how each was read: "xray A", ...; rank 0
   std::vector<std::string> warnings;
 };
 
@@ -65,10 +66,10 @@ struct LoadedCase {
 /// With fields, only rank 0 reads the CT, for its hash and grid (skip_ct_check: nobody does; steps
 /// are then scaled as if it filled 200 mm about the ROI centre), unless a correction casts rays
 /// through it: its attenuation must then equal the fields' (InputError). FileError (exit 4) when a
-/// field was made from another CT (both hashes are named) or misses rays of a view's widest region
-/// at the nominal pose; InputError when a view has no field. A field for another camera is
-/// accepted: at every pose its rays decide, and a note says how far the camera is from the field's
-/// and what is covered.
+/// field was made from another CT than the case's, or than the first field, or misses rays of a
+/// view's widest region at the nominal pose; InputError when a view has no field. A field for
+/// another camera is accepted: at every pose its rays decide, and a note says how far the camera is
+/// from the field's and what is covered.
 LoadedCase load_case(const Study& study,
                      const StudyCase& study_case,
                      const CaseLoadOptions& options,

@@ -58,8 +58,8 @@ bool starts_from_landmarks(const RegisterOptions& options, const StudyCase& stud
 }
 
 /// SHA-256 of the study and, if given, the file of starts, by name.
-std::map<std::string, std::string> hashes_of_files(const RegisterOptions& options) {
-  std::map<std::string, std::string> hashes = {{"study", sha256_of_file(options.study.string())}};
+InputIdentities hashes_of_files(const RegisterOptions& options) {
+  InputIdentities hashes = {{"study", sha256_of_file(options.study.string())}};
   if (!options.starts.empty()) hashes["starts"] = sha256_of_file(options.starts.string());
   return hashes;
 }
@@ -139,10 +139,10 @@ RunDescription description_of(const RegisterOptions& in_force,
                             to_toml(in_force),
                             in_force.method.seed,
                             world.size(),
-                            loaded.input_sha256,
+                            loaded.inputs,
                             loaded.input_notes};
   all_or_none(world, [&] {
-    if (world.is_root()) description.provenance.input_sha256.merge(hashes_of_files(in_force));
+    if (world.is_root()) description.provenance.inputs.merge(hashes_of_files(in_force));
   });
   return description;
 }
@@ -253,9 +253,8 @@ void run_registration(const RegisterOptions& options,
       examiner,
       estimator,
       registered.starts,
-      folder.unfinished(
-          "registrations",
-          deciding_values(deciding_options(in_force), description.provenance.input_sha256)),
+      folder.unfinished("registrations",
+                        deciding_values(deciding_options(in_force), description.provenance.inputs)),
       world);
   all_or_none(world, [&] {
     if (world.is_root())

@@ -11,6 +11,7 @@
 #include "field/codebook.h"
 #include "geometry/light_slab.h"
 #include "geometry/motion_range.h"
+#include "volume/ct_identity.h"
 
 namespace af {
 
@@ -23,7 +24,7 @@ struct FieldIdentity {
   CameraGeometry camera;  ///< the camera it was sized for
   PoseFrame frame;        ///< (R0, c, r)
   MotionRange range;
-  std::string ct_content_sha256;  ///< over size and int16 HU voxels
+  CtIdentity ct;
   double mu_water_per_mm = 0.0200;
   int air_below_hu = -900;
   FieldMaterial material = FieldMaterial::All;

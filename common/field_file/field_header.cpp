@@ -179,11 +179,7 @@ void require_same_origin(const AttenuationAtlas& atlas, const std::filesystem::p
   const FieldIdentity& all = atlas.identity;
   for (std::size_t i = 0; i < atlas.members.size(); ++i) {
     const FieldIdentity& one = atlas.members[i].identity;
-    if (one.ct_content_sha256 != all.ct_content_sha256)
-      throw FileError(path.string(),
-                      member_group(i) + "/identity/ct_content_sha256",
-                      all.ct_content_sha256,
-                      one.ct_content_sha256);
+    require_same_ct(path.string() + ": " + member_group(i), all.ct, "the atlas's", one.ct);
     if (one.mu_water_per_mm != all.mu_water_per_mm || one.air_below_hu != all.air_below_hu)
       throw FileError(path.string(),
                       member_group(i) + "/identity",
@@ -220,8 +216,8 @@ FileHeader read_header(const std::filesystem::path& path) {
   const std::string ct_sha256 = hdf5::read_text_attribute(file, "ct_sha256");
   const FieldIdentity identity = header.is_atlas ? header.atlas(path.string()).identity
                                                  : header.fields[0].field(path.string()).identity;
-  if (ct_sha256 != identity.ct_content_sha256)
-    throw FileError(path.string(), "attribute ct_sha256", identity.ct_content_sha256, ct_sha256);
+  if (ct_sha256 != identity.ct.content_sha256)
+    throw FileError(path.string(), "attribute ct_sha256", identity.ct.content_sha256, ct_sha256);
   if (header.is_atlas) require_same_origin(header.atlas(path.string()), path);
   return header;
 }

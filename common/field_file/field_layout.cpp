@@ -108,7 +108,12 @@ StoredValues stored_values(StoredIdentity& stored) {
   values.matrix("center_room_mm", identity.frame.center_room_mm, "mm", "room");
   values.numbers("max_rotation_rad", {&stored.max_rotation_rad}, "rad", "room");
   values.numbers("max_translation_mm", {&stored.max_translation_mm}, "mm", "room");
-  values.text("ct_content_sha256", identity.ct_content_sha256, kSha256Digits);
+  CtGrid& ct = identity.ct.grid;
+  values.text("ct_content_sha256", identity.ct.content_sha256, kSha256Digits);
+  values.numbers("ct_size_voxels", {&ct.size[0], &ct.size[1], &ct.size[2]}, "1", "ct");
+  values.matrix("ct_origin_mm", ct.origin_mm, "mm", "ct");
+  values.matrix("ct_spacing_mm", ct.spacing_mm, "mm", "ct");
+  values.matrix("ct_direction", ct.direction, "1", "ct");
   values.numbers("mu_water_per_mm", {&identity.mu_water_per_mm}, "1/mm", "none");
   values.numbers("air_below_hu", {&identity.air_below_hu}, "HU", "none");
   return values;

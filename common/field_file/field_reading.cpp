@@ -144,11 +144,7 @@ void require_bone_of(const FieldIdentity& all,
   if (found.material != FieldMaterial::Bone)
     throw FileError(
         path.string(), "/material", "a field of the CT's bone alone", "one of all of it");
-  if (found.ct_content_sha256 != all.ct_content_sha256)
-    throw FileError(path.string(),
-                    "CT of the field (ct_content_sha256)",
-                    all.ct_content_sha256 + " (the CT of the field beside it)",
-                    found.ct_content_sha256);
+  require_same_ct(path.string(), all.ct, "that of the field beside it", found.ct);
   if (found.mu_water_per_mm != all.mu_water_per_mm || found.air_below_hu != all.air_below_hu)
     throw FileError(path.string(),
                     "attenuation",

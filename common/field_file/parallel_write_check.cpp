@@ -35,7 +35,7 @@ constexpr int kTestChunksOfBlock = 64;
 CompressedAttenuationField field_of_tiles(const std::array<int, 4>& tiles) {
   CompressedAttenuationField field;
   field.identity.camera.name = "test";
-  field.identity.ct_content_sha256 = std::string(64, '0');
+  field.identity.ct.content_sha256 = std::string(64, '0');
   field.light_slab.uv_plane_y_mm = 1.0;
   field.light_slab.u = {0.0, 1.0, 2 * tiles[0]};
   field.light_slab.v = {0.0, 1.0, 2 * tiles[1]};

@@ -39,8 +39,8 @@ constexpr double kMostDenseRemoved = 0.1;
 constexpr double kMaxDirectionError = 1e-4;
 /// Between the affine of a NIfTI header and what ITK makes of it, at any corner of the volume.
 constexpr double kMaxAffineDifferenceMm = 0.05;
-/// Two axis orders whose fit differs by less than this are a tie (directions near 45 degrees).
-constexpr double kAxisOrderMargin = 1e-3;
+/// Weight of what settles ties of axis orders (directions at 45 degrees).
+constexpr double kTieWeight = 1e-2;
 
 std::string triple(const auto& values) {
   const auto text = [](const auto value) {
@@ -244,22 +244,50 @@ struct AxisOrder {
   std::array<bool, 3> reversed = {false, false, false};
 };
 
+Eigen::Matrix3d reordered(const Eigen::Matrix3d& direction, const AxisOrder& order) {
+  Eigen::Matrix3d result;
+  for (std::size_t world = 0; world < 3; ++world)
+    result.col(static_cast<Eigen::Index>(world)) =
+        (order.reversed[world] ? -1.0 : 1.0) * direction.col(order.axis[world]);
+  return result;
+}
+
+/// The order follows from where the axes point, not from their order in the file.
 AxisOrder ascending_lps_order(const Eigen::Matrix3d& direction) {
   AxisOrder best;
   double best_fit = -1.0;
-  std::array<int, 3> axis = {0, 1, 2};
+  AxisOrder order;
   do {
-    double fit = 0.0;
-    for (int world = 0; world < 3; ++world)
-      fit += std::abs(direction(world, axis[static_cast<std::size_t>(world)]));
-    if (fit > best_fit + kAxisOrderMargin) {
+    for (std::size_t world = 0; world < 3; ++world)
+      order.reversed[world] = direction(static_cast<Eigen::Index>(world), order.axis[world]) < 0.0;
+    const Eigen::Matrix3d axes = reordered(direction, order);
+    const double fit = axes.trace() + kTieWeight * (axes(1, 0) + axes(2, 0) + axes(2, 1));
+    if (fit > best_fit) {
       best_fit = fit;
-      best.axis = axis;
+      best = order;
     }
-  } while (std::next_permutation(axis.begin(), axis.end()));
-  for (std::size_t world = 0; world < 3; ++world)
-    best.reversed[world] = direction(static_cast<Eigen::Index>(world), best.axis[world]) < 0.0;
+  } while (std::next_permutation(order.axis.begin(), order.axis.end()));
   return best;
+}
+
+/// Where the axes of `order` begin, as an index of the grid.
+Eigen::Vector3d first_index(const CtGrid& grid, const AxisOrder& order) {
+  Eigen::Vector3d index = Eigen::Vector3d::Zero();
+  for (std::size_t world = 0; world < 3; ++world)
+    if (order.reversed[world])
+      index[order.axis[world]] = grid.size[static_cast<std::size_t>(order.axis[world])] - 1.0;
+  return index;
+}
+
+CtGrid reordered(const CtGrid& grid, const AxisOrder& order) {
+  CtGrid result;
+  for (std::size_t world = 0; world < 3; ++world) {
+    result.size[world] = grid.size[static_cast<std::size_t>(order.axis[world])];
+    result.spacing_mm[static_cast<Eigen::Index>(world)] = grid.spacing_mm[order.axis[world]];
+  }
+  result.origin_mm = grid.point_mm(first_index(grid, order));
+  result.direction = reordered(grid.direction, order);
+  return result;
 }
 
 template <typename T>
@@ -347,16 +375,16 @@ void write_ct(const CtVolume& ct, const fs::path& path) {
   write_raw_image(raw_image_of(ct), path);
 }
 
-std::string ct_content_sha256(const CtVolume& ct) {
+CtIdentity identity_of(const CtVolume& ct) {
   const AxisOrder order = ascending_lps_order(ct.grid.direction);
+  const CtGrid grid = reordered(ct.grid, order);
+  const std::array<int, 3>& size = grid.size;
   const std::array<std::ptrdiff_t, 3> stride = {
       1, ct.grid.size[0], std::ptrdiff_t{ct.grid.size[0]} * ct.grid.size[1]};
-  std::array<int, 3> size{};
   std::array<std::ptrdiff_t, 3> step{};
   std::ptrdiff_t first = 0;
   for (std::size_t world = 0; world < 3; ++world) {
     const auto from = static_cast<std::size_t>(order.axis[world]);
-    size[world] = ct.grid.size[from];
     step[world] = order.reversed[world] ? -stride[from] : stride[from];
     if (order.reversed[world]) first += stride[from] * (size[world] - 1);
   }
@@ -373,7 +401,7 @@ std::string ct_content_sha256(const CtVolume& ct) {
     }
     hash.update(bytes);
   }
-  return hash.hex_digest();
+  return {hash.hex_digest(), grid};
 }
 
 }  // namespace af

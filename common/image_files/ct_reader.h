@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <string>
 
+#include "volume/ct_identity.h"
 #include "volume/ct_read_options.h"
 #include "volume/ct_volume.h"
 
@@ -35,9 +36,9 @@ void require_sound_grid(const CtGrid& grid, const std::string& file);
 /// Writes a CT (int16) by extension (.mha .nii.gz .nrrd), atomically.
 void write_ct(const CtVolume& ct, const std::filesystem::path& path);
 
-/// SHA-256 over size (three little-endian int32) and voxels (little-endian int16, i fastest), after
-/// reordering the axes to ascending LPS (so that the same CT as DICOM and as NIfTI has the same
-/// hash).
-std::string ct_content_sha256(const CtVolume& ct);
+/// The hash is over size (three little-endian int32) and voxels (little-endian int16, i fastest),
+/// after reordering the axes to ascending LPS: files may store one CT along other axes, or reversed
+/// ones.
+CtIdentity identity_of(const CtVolume& ct);
 
 }  // namespace af

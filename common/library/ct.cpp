@@ -59,7 +59,7 @@ const std::vector<std::string>& Ct::warnings() const {
 }
 
 std::string Ct::content_sha256() const {
-  return library::translated([&] { return af::ct_content_sha256(impl_->ct); });
+  return library::translated([&] { return af::identity_of(impl_->ct).content_sha256; });
 }
 
 std::shared_ptr<const af::AttenuationVolume> Ct::Impl::attenuation(

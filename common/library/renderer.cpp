@@ -14,6 +14,7 @@
 #include "drr/ray_cast_drr.h"
 #include "drr/xray_beam.h"
 #include "field_use/opened_field.h"
+#include "image_files/ct_reader.h"
 #include "library/ct_impl.h"
 #include "library/translation.h"
 #include "pose_files/pose_file.h"
@@ -288,7 +289,7 @@ struct Field::Facts {
   int members = 1;
   double max_rotation_deg = 0.0;
   double max_translation_mm = 0.0;
-  std::string ct_content_sha256;
+  af::CtIdentity ct;
   std::string payload_sha256;
   double water_mu_per_mm = 0.0;
 };
@@ -314,7 +315,7 @@ Field Field::open(const std::filesystem::path& path,
     const af::MotionRange within = identity.range.symmetric_part();
     facts->max_rotation_deg = within.max_rotation_rad() * af::kDegPerRad;
     facts->max_translation_mm = within.max_translation_mm();
-    facts->ct_content_sha256 = identity.ct_content_sha256;
+    facts->ct = identity.ct;
     facts->payload_sha256 = opened.info().payload_sha256;
     facts->water_mu_per_mm = identity.mu_water_per_mm;
     const af::CameraGeometry camera =
@@ -345,8 +346,13 @@ double Field::max_translation_mm() const {
   return facts_->max_translation_mm;
 }
 
+bool Field::is_of(const Ct& ct) const {
+  return library::translated(
+      [&] { return af::ct_difference(facts_->ct, af::identity_of(ct.impl_->ct)).empty(); });
+}
+
 const std::string& Field::ct_content_sha256() const {
-  return facts_->ct_content_sha256;
+  return facts_->ct.content_sha256;
 }
 
 const std::string& Field::payload_sha256() const {

@@ -2,21 +2,34 @@
 #pragma once
 
 #include <map>
+#include <nlohmann/json.hpp>
 #include <string>
+#include <variant>
 #include <vector>
+
+#include "run/input_identity.h"
+#include "text/options_toml.h"
 
 namespace af {
 
-/// What unfinished work is valid for: every option and input that decides its results.
-using DecidingValues = std::map<std::string, std::string>;
+/// A text is compared letter by letter. A CT, and three numbers that may follow from its grid, are
+/// compared to kSamePlaceMm: the CT's files differ in their last digits.
+using DecidingValue = std::variant<std::string, Eigen::Vector3d, CtIdentity>;
 
-/// What decides every result of a run: deciding_options(), the inputs' SHA-256 by name, and this
+/// What unfinished work is valid for: every option and input that decides its results.
+using DecidingValues = std::map<std::string, DecidingValue>;
+
+/// What decides every result of a run: deciding_options(), the identities of its inputs, and this
 /// program's version and the beginning of its file's SHA-256: another build may compute something
 /// else.
-DecidingValues deciding_values(DecidingValues options,
-                               const std::map<std::string, std::string>& input_sha256);
+DecidingValues deciding_values(const OptionTexts& options, const InputIdentities& inputs);
 
 /// Every difference between what earlier work was begun with and what is asked for now.
 std::vector<std::string> differences(const DecidingValues& earlier, const DecidingValues& now);
+
+nlohmann::json to_json(const DecidingValues& values);
+
+/// Of what to_json() made. Throws nlohmann's exceptions.
+DecidingValues deciding_values_of(const nlohmann::json& json);
 
 }  // namespace af

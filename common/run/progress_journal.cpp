@@ -131,7 +131,7 @@ UnfinishedWork read_manifest(const fs::path& path, std::int64_t least_unit_size)
       throw unusable("is not of the format " + std::string(kFormat) + " " +
                      std::to_string(kFormatVersion));
     UnfinishedWork work;
-    work.decides = manifest.at("decides").get<DecidingValues>();
+    work.decides = deciding_values_of(manifest.at("decides"));
     work.unit_size = manifest.at("plan").get<std::int64_t>();
     if (work.unit_size < least_unit_size)
       throw unusable("plan = " + std::to_string(work.unit_size) + ": must be at least " +
@@ -239,7 +239,7 @@ void ProgressJournal::open(const UnfinishedWork& work) {
   fs::remove_all(files_.manifest());
   const nlohmann::json written = {{"format", kFormat},
                                   {"format_version", kFormatVersion},
-                                  {"decides", work.decides},
+                                  {"decides", to_json(work.decides)},
                                   {"plan", work.unit_size}};
   write_text_file(files_.manifest(), written.dump(2) + "\n");
 }

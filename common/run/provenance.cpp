@@ -45,6 +45,11 @@ std::string comment_text(std::string text) {
   return text;
 }
 
+std::string identity_text(const InputIdentity& input) {
+  const auto* const ct = std::get_if<CtIdentity>(&input);
+  return ct != nullptr ? text(*ct) : std::get<std::string>(input);
+}
+
 std::string script_text(const Provenance& provenance) {
   const bool is_parallel = provenance.rank_count > 1;
   std::string text = "#!/bin/sh\n# Repeats the run that made the files beside this script.\n";
@@ -53,9 +58,9 @@ std::string script_text(const Provenance& provenance) {
           "), started " + utc_text(process_start_time) + ", " +
           std::to_string(provenance.rank_count) + " rank(s), seed " +
           std::to_string(provenance.seed) + "\n";
-  if (!provenance.input_sha256.empty()) text += "# Its inputs, by SHA-256:\n";
-  for (const auto& [name, hash] : provenance.input_sha256)
-    text += "#   " + comment_text(hash) + "  " + comment_text(name) + "\n";
+  if (!provenance.inputs.empty()) text += "# Its inputs, by SHA-256:\n";
+  for (const auto& [name, input] : provenance.inputs)
+    text += "#   " + comment_text(identity_text(input)) + "  " + comment_text(name) + "\n";
   text += "set -eu\nfolder=" + shell_quoted(std::filesystem::current_path().string()) + "\n";
   text +=
       "if [ -d \"$folder\" ]; then\n"
@@ -72,6 +77,13 @@ std::string script_text(const Provenance& provenance) {
 }  // namespace
 
 nlohmann::json to_json(const Provenance& provenance) {
+  nlohmann::json hashes = nlohmann::json::object();
+  nlohmann::json grids = nlohmann::json::object();
+  for (const auto& [name, input] : provenance.inputs) {
+    const auto* const ct = std::get_if<CtIdentity>(&input);
+    hashes[name] = ct != nullptr ? ct->content_sha256 : std::get<std::string>(input);
+    if (ct != nullptr) grids[name] = to_json(ct->grid);
+  }
   return {
       {"program", provenance.program},
       {"program_version", std::string(program_version())},
@@ -81,7 +93,8 @@ nlohmann::json to_json(const Provenance& provenance) {
       {"options_toml", provenance.options_toml},
       {"seed", provenance.seed},
       {"rank_count", provenance.rank_count},
-      {"input_sha256", provenance.input_sha256},
+      {"input_sha256", hashes},
+      {"input_grids", grids},
       {"input_notes", provenance.input_notes},
       {"host", {{"cpu", cpu_model()}, {"vector_bits", static_cast<int>(active_vector_width())}}},
       {"started_utc", utc_text(process_start_time)}};

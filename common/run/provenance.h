@@ -7,6 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "run/input_identity.h"
+
 namespace af {
 
 /// What every output records about its making.
@@ -16,7 +18,7 @@ struct Provenance {
   std::string options_toml;  ///< the options in force
   std::uint64_t seed = 0;
   int rank_count = 1;
-  std::map<std::string, std::string> input_sha256;      ///< name or path -> hash
+  InputIdentities inputs;
   std::map<std::string, std::string> input_notes = {};  ///< name -> how it was read; may be empty
 };
 

@@ -29,8 +29,7 @@ struct FoundInCt {
 
 FoundInCt found_in(const CtVolume& ct, const AttenuationModel& model) {
   const AttenuatingBox box = attenuating_box(ct, model);
-  return {{ct.grid, ct_content_sha256(ct), cut_points(ct, model, box)},
-          bordered_grid(ct.grid, box)};
+  return {{ct.grid, identity_of(ct), cut_points(ct, model, box)}, bordered_grid(ct.grid, box)};
 }
 
 /// Collective. Rank 0 reads the CT, into `ct`, and every rank gets what is found in it.

@@ -19,12 +19,12 @@ namespace af {
 /// What is known of a CT without its voxels.
 struct CtFacts {
   CtGrid grid;
-  std::string content_sha256;
+  CtIdentity identity;
   std::vector<Eigen::Vector3d> cut_points_ct;  ///< see cut_points()
 
   auto members() {
     return std::tie(
-        grid.size, grid.origin_mm, grid.spacing_mm, grid.direction, content_sha256, cut_points_ct);
+        grid.size, grid.origin_mm, grid.spacing_mm, grid.direction, identity, cut_points_ct);
   }
 };
 
@@ -60,7 +60,7 @@ std::shared_ptr<const AttenuationVolume> volume_per_node(
 std::shared_ptr<const AttenuationVolume> bone_per_node(const AttenuationVolume& volume,
                                                        const Communicator& communicator);
 
-/// Collective. Rank 0 reads the CT for its grid, hash and cuts.
+/// Collective. Rank 0 reads the CT for its grid, identity and cuts.
 CtFacts read_ct_facts(const std::filesystem::path& path,
                       const CtReadOptions& options,
                       const AttenuationModel& model,

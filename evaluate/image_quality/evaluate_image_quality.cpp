@@ -130,11 +130,8 @@ Setup load(const ImageQualityOptions& options, const Target& target, const Commu
   for (const std::string& text : warnings) warn(world, text);
   std::vector<std::string> notes;
   all_or_none(world, [&] {
-    if (setup.ct.facts.content_sha256 != identity.ct_content_sha256)
-      throw FileError(target.field.string(),
-                      "CT of the field (ct_content_sha256)",
-                      setup.ct.facts.content_sha256 + " (" + target.ct.string() + ")",
-                      identity.ct_content_sha256);
+    require_same_ct(
+        target.field.string(), setup.ct.facts.identity, target.ct.string(), identity.ct);
     const FieldLattice lattice =
         setup.field->field() ? setup.field->field()->lattice() : setup.field->atlas()->lattice();
     if (options.split_loss_poses > 0 && lattice.slabs.size() != 1)
@@ -361,20 +358,19 @@ TargetResult evaluate_target(const ImageQualityOptions& options,
                            options.seed,
                            world.size(),
                            {{"field " + setup.view.camera.name, setup.field->info().payload_sha256},
-                            {"ct", setup.ct.facts.content_sha256}}};
+                            {"ct", setup.ct.facts.identity}}};
   if (setup.bone)
-    provenance.input_sha256["bone field " + setup.view.camera.name] =
-        setup.bone->info().payload_sha256;
+    provenance.inputs["bone field " + setup.view.camera.name] = setup.bone->info().payload_sha256;
   all_or_none(world, [&] {
     if (world.is_root() && !options.poses.empty())
-      provenance.input_sha256["poses"] = sha256_of_file(options.poses.string());
+      provenance.inputs["poses"] = sha256_of_file(options.poses.string());
     if (world.is_root() && !options.rig.empty())
       for (const std::filesystem::path& file : rig_files(options.rig))
-        provenance.input_sha256["rig " + file.filename().string()] = sha256_of_file(file.string());
+        provenance.inputs["rig " + file.filename().string()] = sha256_of_file(file.string());
   });
   const std::string name = target.folder.filename().string();
   const auto unfinished = [&](const std::string& what) {
-    DecidingValues values = deciding_values(deciding_options(options), provenance.input_sha256);
+    DecidingValues values = deciding_values(deciding_options(options), provenance.inputs);
     if (!setup.camera_distance.is_none())
       values["camera"] = camera_distance_json(setup.camera_distance, setup.range).dump();
     return run.unfinished(name + what, values);

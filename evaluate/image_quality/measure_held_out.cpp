@@ -176,11 +176,7 @@ std::vector<Predictor> load_predictors(const HeldOutOptions& options, const Comm
     const OpenedField field(path, world);
     if (!identity) identity = field.identity();
     all_or_none(world, [&] {
-      if (field.identity().ct_content_sha256 != identity->ct_content_sha256)
-        throw FileError(path.string(),
-                        "CT of the field (ct_content_sha256)",
-                        field.identity().ct_content_sha256,
-                        identity->ct_content_sha256 + ", that of the first field");
+      require_same_ct(path.string(), identity->ct, "that of the first field", field.identity().ct);
     });
     fields.push_back({path.filename().string(), field.renderer(options.look_up, pool)});
   }
@@ -191,11 +187,8 @@ std::vector<Predictor> load_predictors(const HeldOutOptions& options, const Comm
                                      warnings);
   for (const std::string& text : warnings) warn(world, text);
   all_or_none(world, [&] {
-    if (ct.facts.content_sha256 != identity->ct_content_sha256)
-      throw FileError(options.fields.front().string(),
-                      "CT of the field (ct_content_sha256)",
-                      ct.facts.content_sha256 + " (" + options.ct.string() + ")",
-                      identity->ct_content_sha256);
+    require_same_ct(
+        options.fields.front().string(), ct.facts.identity, options.ct.string(), identity->ct);
   });
   std::vector<Predictor> predictors = {
       {"ray casting", std::make_shared<const RayCastDrr>(ct.volume, options.ray_caster, pool)}};

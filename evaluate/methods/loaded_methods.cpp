@@ -76,8 +76,8 @@ std::vector<LoadedMethod> load_methods(
       if (name.starts_with("field "))
         inform(world,
                std::string(study_case.name).append(": ").append(name).append(": ").append(note));
-    for (const auto& [name, hash] : loaded.input_sha256)
-      inputs.sha256[study_case.name + ": " + name] = hash;
+    for (const auto& [name, hash] : loaded.inputs)
+      inputs.identities[study_case.name + ": " + name] = hash;
     for (const auto& [name, note] : loaded.input_notes)
       inputs.notes[study_case.name + ": " + name] = note;
     registration::RegistrationRunner runner = all_or_none(

@@ -10,6 +10,7 @@
 #include "parallel/communicator.h"
 #include "register/kept_fields.h"
 #include "register/method/registration.h"
+#include "run/input_identity.h"
 
 namespace af::evaluation {
 
@@ -22,7 +23,7 @@ struct LoadedMethod {
 
 /// What a case was loaded from, as "CASE: what"; rank 0.
 struct LoadedInputs {
-  std::map<std::string, std::string> sha256;
+  InputIdentities identities;
   std::map<std::string, std::string> notes;  ///< how it was read, as af-register says it
 };
 

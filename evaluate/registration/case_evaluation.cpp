@@ -317,7 +317,8 @@ void announce_times(std::vector<Method>& methods,
 /// Every option, input and start that decides a case's rows.
 DecidingValues deciding_values(const RegistrationStudyOptions& options,
                                const CaseEvaluation& evaluation) {
-  DecidingValues values = af::deciding_values(deciding_options(options), evaluation.inputs.sha256);
+  DecidingValues values =
+      af::deciding_values(deciding_options(options), evaluation.inputs.identities);
   values["case name"] = evaluation.case_name;
   Sha256 starts;
   for (const PerturbedStart& start : evaluation.starts.starts) {

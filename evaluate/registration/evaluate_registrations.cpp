@@ -534,8 +534,8 @@ void run_registration(const RegistrationStudyOptions& options,
                              world.size(),
                              {{"study", sha256_of_file(study.path.string())}}};
     for (const CaseEvaluation& evaluation : evaluations) {
-      provenance.input_sha256.insert(evaluation.inputs.sha256.begin(),
-                                     evaluation.inputs.sha256.end());
+      provenance.inputs.insert(evaluation.inputs.identities.begin(),
+                               evaluation.inputs.identities.end());
       provenance.input_notes.insert(evaluation.inputs.notes.begin(), evaluation.inputs.notes.end());
     }
     write_registrations(folder / "registrations.csv", rows.view(), options.success_tre_mm);

@@ -288,16 +288,16 @@ void run_similarity_curves(const SimilarityCurvesOptions& options,
       "af-evaluate similarity-curves", command_line, to_toml(in_force), 0, world.size(), {}};
   LoadedInputs inputs;
   std::vector<LoadedMethod> methods = load_methods(options, {}, study, study_case, world, inputs);
-  provenance.input_sha256 = inputs.sha256;
+  provenance.inputs = inputs.identities;
   provenance.input_notes = inputs.notes;
   all_or_none(world, [&] {
-    if (world.is_root()) provenance.input_sha256["study"] = sha256_of_file(study.path.string());
+    if (world.is_root()) provenance.inputs["study"] = sha256_of_file(study.path.string());
   });
   std::vector<Curve> curves = empty_curves(options);
   measure_curves(methods,
                  PoseFrame::about(gold.room_from_ct, study_case.center_ct_mm),
                  run,
-                 deciding_values(deciding_options(in_force), provenance.input_sha256),
+                 deciding_values(deciding_options(in_force), provenance.inputs),
                  world,
                  curves);
   all_or_none(world, [&] {

@@ -189,7 +189,7 @@ void run_error_budget(const ErrorBudgetOptions& options,
         "af-evaluate error-budget", command_line, to_toml(options), 0, world.size(), {}};
     for (const std::string& step : options.steps) {
       runs.push_back(read_run(step));
-      provenance.input_sha256[runs.back().budget.label] =
+      provenance.inputs[runs.back().budget.label] =
           sha256_of_file((runs.back().files.folder / "registrations.csv").string());
     }
     require_same_starts(runs);

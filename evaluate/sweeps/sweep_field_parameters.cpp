@@ -210,19 +210,15 @@ void sweep_target(const FieldParametersOptions& options,
     result.setting = setting;
     const auto field = field_of(setting, command_line, world, result.info);
     all_or_none(world, [&] {
-      if (field->identity.ct_content_sha256 != ct.facts.content_sha256)
-        throw FileError(setting.output,
-                        "CT of the field (ct_content_sha256)",
-                        ct.facts.content_sha256,
-                        field->identity.ct_content_sha256);
+      require_same_ct(setting.output, ct.facts.identity, target.ct_path, field->identity.ct);
     });
     result.field = field_description(field->identity, field->light_slab, field->codebook.size());
     result.uncompressed_bytes = uncompressed_bytes_of(setting);
     read_creation(result);
     const Clock::time_point compared = Clock::now();
-    const DecidingValues decides = deciding_values(
-        deciding_options(options, kComparisonStage),
-        {{"the field", result.info.payload_sha256}, {"the CT", ct.facts.content_sha256}});
+    const DecidingValues decides =
+        deciding_values(deciding_options(options, kComparisonStage),
+                        {{"the field", result.info.payload_sha256}, {"the CT", ct.facts.identity}});
     result.comparisons =
         compare(options, field, reference, run.unfinished(field_name(setting), decides), world);
     if (is_made && i == 0)
@@ -230,9 +226,9 @@ void sweep_target(const FieldParametersOptions& options,
                     std::chrono::duration<double>(compared - start).count(),
                     std::chrono::duration<double>(Clock::now() - compared).count(),
                     world);
-    provenance.input_sha256["field " + field_name(setting)] = result.info.payload_sha256;
+    provenance.inputs["field " + field_name(setting)] = result.info.payload_sha256;
   }
-  provenance.input_sha256["ct " + results.back().target()] = ct.facts.content_sha256;
+  provenance.inputs["ct " + results.back().target()] = ct.facts.identity;
 }
 
 }  // namespace

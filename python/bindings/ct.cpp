@@ -100,7 +100,10 @@ void bind_ct(py::module_& module) {
   ct.def_property_readonly("direction", [](const Ct& self) {
     return py::array_t<double>({3, 3}, self.grid().direction.data());
   });
-  ct.def_property_readonly("content_sha256", &Ct::content_sha256);
+  ct.def_property_readonly("content_sha256",
+                           &Ct::content_sha256,
+                           "Of size and voxels, not of where they lie: Field.is_of(ct) compares "
+                           "that, too.");
 }
 
 }  // namespace attenuation_fields::python

@@ -215,6 +215,10 @@ void bind_field(py::module_& module) {
   field.def_property_readonly("look_up", &Field::look_up);
   field.def_property_readonly("max_rotation_deg", &Field::max_rotation_deg);
   field.def_property_readonly("max_translation_mm", &Field::max_translation_mm);
+  field.def("is_of",
+            &Field::is_of,
+            "ct"_a,
+            "Whether it was made from this CT: the same voxels at the same places, to 1e-3 mm.");
   field.def_property_readonly("ct_content_sha256", &Field::ct_content_sha256);
   field.def_property_readonly("payload_sha256", &Field::payload_sha256);
   field.def_property_readonly("water_mu_per_mm", &Field::water_mu_per_mm);

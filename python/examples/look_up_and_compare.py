@@ -22,7 +22,7 @@ print(f"poses within {field.max_rotation_deg:.1f} deg and {field.max_translation
 # the same thing.
 
 # %%
-if ct.content_sha256 != field.ct_content_sha256:
+if not field.is_of(ct):
     sys.exit("this CT is not the one that the field was made from")
 caster = af.RayCaster(
     ct, field.camera, frame=field.frame, water_mu_per_mm=field.water_mu_per_mm, step_mm=0.5

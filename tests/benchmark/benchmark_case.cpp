@@ -73,7 +73,7 @@ std::vector<WorkUnit> BenchmarkCase::units() const {
 
 nlohmann::json BenchmarkCase::description() const {
   return {{"ct", std::filesystem::path(options_.ct).filename().string()},
-          {"ct_content_sha256", ct_content_sha256(ct_)},
+          {"ct_content_sha256", identity_of(ct_).content_sha256},
           {"ct_voxels", ct_.grid.size},
           {"attenuating_voxels", volume_->grid().size},
           {"rig", options_.rig},

@@ -201,6 +201,12 @@ expect 3 'step_mm = 0.5: the unfinished work was begun with 0.05' "${slow[@]:0:1
 expect 3 "caster = \"shear-warp\": the unfinished work was begun with \"trilinear\"" "${slow[@]:0:10}" \
   --max-translation-mm 30 --caster shear-warp --step-mm 0.05 -o slow.h5
 expect 3 'slabs = 2: the unfinished work was begun with 1' "${slow[@]}" --slabs 2 -o slow.h5
+LC_ALL=C sed 's/^Offset = -46 /Offset = -39 /' ct.mha >moved.mha
+expect 3 "CT 'ct' = .* 7 mm off: the unfinished work was begun with" --ct moved.mha "${slow[@]:2}" -o slow.h5
+# Another format may keep fewer digits of where the same CT lies, and so of its centre.
+LC_ALL=C sed 's/^Offset = -46 /Offset = -46.0004 /' ct.mha >same.mha
+expect 3 'slabs = 2: the unfinished work was begun with 1' --ct same.mha "${slow[@]:2}" --slabs 2 -o slow.h5
+! grep -q "CT 'ct'\\|ct_mm" err || fail "the same CT is refused: $(cat err)"
 "$program" "${slow[@]}" -o slow.h5 >slow.txt 2>slow.err
 grep -q 'resumed' slow.err || fail "nothing was resumed: $(cat slow.err)"
 "$program" "${slow[@]}" -o again.h5 --no-checkpoint >again.txt 2>/dev/null

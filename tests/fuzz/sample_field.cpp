@@ -31,7 +31,7 @@ CompressedAttenuationField sample_field() {
   identity.camera.row_direction = {0.0, 0.0, -1.0};
   identity.camera.size_px = {33, 33};
   identity.range = {0.1, 5.0};
-  identity.ct_content_sha256 = std::string(64, 'b');
+  identity.ct.content_sha256 = std::string(64, 'b');
   field.light_slab.uv_plane_y_mm = 600.0;
   field.light_slab.u = field.light_slab.v = {-100.0, 100.0, 4};
   field.light_slab.slabs = {slab_between(-50.0, 0.0), slab_between(0.0, 50.0)};

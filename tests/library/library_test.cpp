@@ -77,7 +77,12 @@ TEST(LibraryField, LooksUpTheDrrOfTheProgram) {
   EXPECT_EQ(field.camera().name, "AP");
   EXPECT_NEAR(field.max_rotation_deg(), 8.0, 1e-9);
   EXPECT_EQ(field.max_translation_mm(), 12.0);
-  EXPECT_EQ(field.ct_content_sha256(), Ct::read(study_file("ct.nii.gz")).content_sha256());
+  const Ct ct = Ct::read(study_file("ct.nii.gz"));
+  EXPECT_EQ(field.ct_content_sha256(), ct.content_sha256());
+  EXPECT_TRUE(field.is_of(ct));
+  CtGrid moved = ct.grid();
+  moved.origin_mm[0] += 7.0;
+  EXPECT_FALSE(field.is_of(Ct::from_voxels(moved, nullptr, ct.hu())));
   EXPECT_THAT(field.payload_sha256(), SizeIs(64));
 }
 

@@ -31,7 +31,7 @@ AttenuationAtlas small_atlas() {
   AttenuationAtlas atlas;
   atlas.identity.camera = test::c_arm_camera(31, 31, 10.0);
   atlas.identity.range = {0.1, 10.0};
-  atlas.identity.ct_content_sha256 = std::string(64, 'a');
+  atlas.identity.ct.content_sha256 = std::string(64, 'a');
   atlas.quantizer_step = 0.00390625f;
   for (std::uint16_t i = 0; i < kCodewords; ++i) {
     Tile tile{};
@@ -136,7 +136,7 @@ std::string refusal(const std::filesystem::path& path) {
 
 /// Of small_atlas(). Frozen: made by these tests on one rank.
 constexpr const char* kAtlasSha256 =
-    "d5e1d77f3320616b1a6bca422ebf3e39d6b477efe63a85b06a861620c2542254";
+    "4e4837614f8de5dbd4d9993ecd773fbe5e4b6c618c31d82dab85c2b62baf463f";
 
 TEST(AtlasFile, ReadsBackWhatRanksWroteTogetherMemberByMember) {
   const test::SharedFolder folder;
@@ -259,10 +259,13 @@ TEST(AtlasFile, RefusesACodebookThatIsNotItsOwn) {
 TEST(AtlasFile, RefusesMembersOfAnotherCt) {
   const test::SharedFolder folder;
   AttenuationAtlas atlas = small_atlas();
-  atlas.members[1].identity.ct_content_sha256 = std::string(64, 'b');
+  atlas.members[1].identity.ct.content_sha256 = std::string(64, 'b');
   write(atlas, folder / "a.h5");
-  EXPECT_NE(refusal(folder / "a.h5").find("/member_1/identity/ct_content_sha256"),
-            std::string::npos);
+  EXPECT_NE(refusal(folder / "a.h5").find("/member_1: CT of the field"), std::string::npos);
+  atlas = small_atlas();
+  atlas.members[1].identity.ct.grid.origin_mm.z() += 7.0;
+  write(atlas, folder / "a.h5");
+  EXPECT_NE(refusal(folder / "a.h5").find("7 mm off"), std::string::npos);
   atlas = small_atlas();
   atlas.members[0].identity.mu_water_per_mm = 0.03;
   write(atlas, folder / "a.h5");

@@ -74,7 +74,7 @@ class FieldBuildTest : public testing::Test {
     field.identity.camera.name = "AP";
     field.identity.camera.detector_origin_point = {-100.0, -100.0, 1000.0};
     field.identity.camera.size_px = {200, 200};
-    field.identity.ct_content_sha256 = std::string(64, 'b');
+    field.identity.ct.content_sha256 = std::string(64, 'b');
     field.light_slab = light_slab_;
     field.quantizer_step = quantizer_.step();
     field.codebook =

@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/hash_random.h"
+#include "base/stored_bytes.h"
 #include "field_file/field_layout.h"
 #include "field_file/field_reading.h"
 #include "field_file/field_writing.h"
@@ -25,7 +26,7 @@ namespace {
 constexpr std::uint64_t kSeed = 5;
 /// Of small_field(). Frozen: made by these tests on one rank with format version 1.
 constexpr const char* kPayloadSha256 =
-    "c4d25e978a038a8745f6bf31cdafac62251aabc5e05d7d200ef51f96ca1d99f0";
+    "c2a920a26c8f1bee1f140cfab18ba74be78244667ae2dece51c9658bcd7d17fc";
 
 /// Two slabs of odd and even sizes; numbers chosen to be exact.
 CompressedAttenuationField small_field() {
@@ -39,7 +40,12 @@ CompressedAttenuationField small_field() {
   camera.size_px = {256, 256};
   field.identity.frame.center_ct_mm = {1.0, 2.0, 3.0};
   field.identity.range = {0.125, 100.0};
-  field.identity.ct_content_sha256 = std::string(64, 'a');
+  field.identity.ct.content_sha256 = std::string(64, 'a');
+  CtGrid& ct = field.identity.ct.grid;
+  ct.size = {5, 6, 7};
+  ct.origin_mm = {-0.1, 2.0 / 3.0, 1e3 / 7.0};
+  ct.spacing_mm = {0.3, 0.7, 1.1};
+  ct.direction << 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0;
   field.light_slab.slab_from_ct.translation() = Eigen::Vector3d(0.5, 0.25, -4.0);
   field.light_slab.uv_plane_y_mm = 650.0;
   field.light_slab.u = {-280.0, 280.0, 7};
@@ -171,7 +177,7 @@ TEST(FieldFile, ReadsBackWhatRanksWroteTogether) {
   EXPECT_EQ(read->quantizer_step, field.quantizer_step);
   EXPECT_EQ(read->identity.camera.name, "AP");
   EXPECT_EQ(read->identity.camera.size_px, field.identity.camera.size_px);
-  EXPECT_EQ(read->identity.ct_content_sha256, field.identity.ct_content_sha256);
+  EXPECT_EQ(bytes_of(read->identity.ct), bytes_of(field.identity.ct));
   EXPECT_EQ(read->identity.frame.center_ct_mm, field.identity.frame.center_ct_mm);
   EXPECT_EQ(read->light_slab.slab_from_ct.matrix(), field.light_slab.slab_from_ct.matrix());
   ASSERT_EQ(read->slabs.size(), 2u);
@@ -976,7 +982,10 @@ TEST(FieldFile, SaysThatItIsOfBoneAloneBesideThePayload) {
   other.mu_water_per_mm = 0.019;
   EXPECT_THROW(is_of(other, bone->identity), FileError);
   other = all->identity;
-  other.ct_content_sha256 = std::string(64, 'b');
+  other.ct.content_sha256 = std::string(64, 'b');
+  EXPECT_THROW(is_of(other, bone->identity), FileError);
+  other = all->identity;
+  other.ct.grid.spacing_mm *= 1.1;
   EXPECT_THROW(is_of(other, bone->identity), FileError);
 }
 

@@ -69,7 +69,7 @@ TEST(AfInspect, TellsACtsGeometryValuesAndContentHash) {
   const json& facts = entry["facts"];
   EXPECT_EQ(facts["geometry"]["size_voxels"], json({7, 6, 5}));
   EXPECT_EQ(facts["geometry"]["axes_point_to"], json({"R", "A", "S"}));
-  EXPECT_EQ(facts["ct_content_sha256"], ct_content_sha256(ct));
+  EXPECT_EQ(facts["ct_content_sha256"], identity_of(ct).content_sha256);
   EXPECT_EQ(facts["values"]["min_hu"], -1000);
   // 7 x 6 x 5 voxels, of which all with i < 2 or j < 1 are air: 1 - (5 * 5) / (7 * 6). Where
   // position adds up to 100 HU (i + 7 j + 13 k = 100 at most 93), air stays below -900.
@@ -102,7 +102,7 @@ TEST(AfInspect, RefusesADicomFolderWithTwoSeriesUntilOneIsChosen) {
   EXPECT_EQ(run.exit_code, 3);
   EXPECT_THAT(run.output, HasSubstr("1.2.3.5  5 slices"));
   const json entry = inspect_json("--series 1.2.3.5 " + (folder / "dicom").string());
-  EXPECT_EQ(entry["facts"]["ct_content_sha256"], ct_content_sha256(ct));
+  EXPECT_EQ(entry["facts"]["ct_content_sha256"], identity_of(ct).content_sha256);
 }
 
 TEST(AfInspect, ReadsAStudysCtAsTypedWhenItWritesPoses) {
@@ -353,6 +353,7 @@ TEST(AfInspect, VerifiesAFieldAndAStudyAndSeesDamage) {
   EXPECT_EQ(facts["codewords"], 16);
   EXPECT_EQ(facts["ct_content_sha256"],
             inspect_json((folder / "ct.nii.gz").string())["facts"]["ct_content_sha256"]);
+  EXPECT_EQ(facts["ct_grid"]["size_voxels"], json(test::five_ellipsoids().grid.size));
   // 6 x 6 viewpoints of 24 x 24 rays, 2 bytes each, in MB of 10^6 bytes.
   EXPECT_DOUBLE_EQ(facts["sizes"]["uncompressed_mb"].get<double>(), 2 * 36 * 576 / 1e6);
   EXPECT_DOUBLE_EQ(facts["sizes"]["file_mb"].get<double>(),

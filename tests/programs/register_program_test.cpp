@@ -105,6 +105,8 @@ TEST_F(RegisterProgram, RegistersByFieldAndByRayCasting) {
   const nlohmann::json provenance = result("by-field").at("provenance");
   // Study, its case, CT, two fields, two X-rays.
   EXPECT_EQ(provenance.at("input_sha256").size(), 7U) << provenance;
+  EXPECT_EQ(provenance.at("input_grids").at("ct").at("size_voxels"),
+            nlohmann::json(test::five_ellipsoids().grid.size));
 }
 
 TEST_F(RegisterProgram, LooksAFieldUpAsItIsMeantToBe) {
@@ -335,13 +337,48 @@ TEST_F(RegisterProgram, RefusesAFieldOfAnotherCtAndNamesBothHashes) {
                               (other / "study.toml").string() + fields() + " --max-evaluations 20" +
                               " -o " + (other / "out").string();
   const test::ProgramRun run = test::run_command(command);
-  expect_refused(run, 4, ct_content_sha256(ct));
-  EXPECT_NE(run.output.find(ct_content_sha256(test::five_ellipsoids())), std::string::npos);
+  expect_refused(run, 4, identity_of(ct).content_sha256);
+  EXPECT_NE(run.output.find(identity_of(test::five_ellipsoids()).content_sha256),
+            std::string::npos);
   // Told not to look, it does not; nor does the CT need to be there.
   fs::remove(other / "ct.nii.gz");
   const test::ProgramRun unchecked = test::run_command(command + " --skip-ct-check");
   EXPECT_EQ(unchecked.exit_code, 0) << unchecked.output;
   EXPECT_NE(unchecked.output.find("warning"), std::string::npos) << unchecked.output;
+}
+
+TEST_F(RegisterProgram, RefusesAFieldOfACtThatLiesElsewhereButNotOfOneInAnotherFormat) {
+  const test::ScratchFolder other;
+  for (const char* name : {"rig.toml", "AP.mha", "LAT.mha"})
+    fs::copy_file(path(name), other / name);
+  const CtVolume ct = test::five_ellipsoids();
+  CtVolume moved = ct;
+  moved.grid.origin_mm.x() += 7.0;
+  CtVolume scaled = ct;
+  scaled.grid.spacing_mm *= 1.1;
+  const std::string study = read_text_file(path("study.toml"));
+  const std::string named = "ct.nii.gz";
+  ASSERT_NE(study.find(named), std::string::npos) << study;
+  const std::string field = path("AP.af.h5");
+  const auto registered = [&](const CtVolume& of, const std::string& name) {
+    write_ct(of, other / name);
+    write_text_file(other / "study.toml",
+                    std::string(study).replace(study.find(named), named.size(), name));
+    return test::run_command(program("af-register") + " --study " +
+                             (other / "study.toml").string() + fields() +
+                             " --max-evaluations 20 -o " + (other / (name + ".results")).string());
+  };
+  const auto compared = [&](const std::string& name) {
+    return run_drr("--field " + field + " --ct " + (other / name).string() + " --compare -o " +
+                   (other / "compared.png").string());
+  };
+  const test::ProgramRun same = registered(ct, "ct.nrrd");
+  EXPECT_EQ(same.exit_code, 0) << same.output;
+  EXPECT_EQ(compared("ct.nrrd").exit_code, 0);
+  for (const auto& [name, of] : {std::pair("moved.mha", moved), std::pair("scaled.mha", scaled)}) {
+    expect_refused(registered(of, name), 4, "AP.af.h5: CT of the field: expected");
+    expect_refused(compared(name), 4, "mm off");
+  }
 }
 
 TEST_F(RegisterProgram, ListsWhatThereIsToChooseFromWithoutACase) {

@@ -218,7 +218,11 @@ class FieldTest(unittest.TestCase):
         field = open_field()
         self.assertEqual((field.look_up, field.max_translation_mm), ("linear", 12.0))
         self.assertEqual(field.camera.name, "AP")
-        self.assertEqual(field.ct_content_sha256, af.Ct.read(STUDY / "ct.nii.gz").content_sha256)
+        ct = af.Ct.read(STUDY / "ct.nii.gz")
+        self.assertEqual(field.ct_content_sha256, ct.content_sha256)
+        self.assertTrue(field.is_of(ct))
+        moved = af.Ct(ct.hu, ct.spacing_mm, ct.origin_mm + (7.0, 0.0, 0.0), ct.direction)
+        self.assertFalse(field.is_of(moved))
 
     def test_pose_parameters_come_back(self):
         frame = open_field().frame

@@ -42,10 +42,12 @@ class ATTENUATION_FIELDS_API Ct {
   [[nodiscard]] std::span<const std::int16_t> hu() const;
   /// What read() found odd.
   [[nodiscard]] const std::vector<std::string>& warnings() const;
-  /// Over size and voxels in ascending LPS: one CT has one hash in every format. Fields carry it.
+  /// Over size and voxels in ascending LPS: one CT has one hash in every format. It does not say
+  /// where the voxels lie: Field::is_of() compares that, too.
   [[nodiscard]] std::string content_sha256() const;
 
  private:
+  friend class Field;
   friend class RayCaster;
   struct Impl;
   explicit Ct(std::shared_ptr<const Impl> impl);

@@ -109,6 +109,9 @@ class ATTENUATION_FIELDS_API Field : public Renderer {
   /// this large.
   [[nodiscard]] double max_rotation_deg() const;
   [[nodiscard]] double max_translation_mm() const;
+  /// Whether it was made from this CT: the same voxels at the same places, to 1e-3 mm.
+  [[nodiscard]] bool is_of(const Ct& ct) const;
+  /// Ct::content_sha256() of the CT that it was made from.
   [[nodiscard]] const std::string& ct_content_sha256() const;
   [[nodiscard]] const std::string& payload_sha256() const;
   [[nodiscard]] double water_mu_per_mm() const;

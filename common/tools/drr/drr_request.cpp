@@ -238,12 +238,7 @@ CastCt ray_caster(const DrrOptions& options,
   const CtVolume ct = read_ct(source.ct, source.ct_reading);
   AttenuationModel model = options.attenuation;
   if (field.has_value()) {
-    const std::string hash = ct_content_sha256(ct);
-    if (hash != field->ct_content_sha256)
-      throw FileError(options.field.string(),
-                      "CT of the field (ct_content_sha256)",
-                      hash + " (" + source.ct.string() + ")",
-                      field->ct_content_sha256);
+    require_same_ct(options.field.string(), identity_of(ct), source.ct.string(), field->ct);
     // --compare compares ways to render, so the reference takes the field's HU model.
     model = {field->mu_water_per_mm, field->air_below_hu};
   }
@@ -259,11 +254,7 @@ Image2d negated(Image2d image) {
 void require_same_subject(const FieldIdentity& wanted,
                           const FieldIdentity& found,
                           const std::string& path) {
-  if (found.ct_content_sha256 != wanted.ct_content_sha256)
-    throw FileError(path,
-                    "CT of the field (ct_content_sha256)",
-                    wanted.ct_content_sha256 + " (that of --field)",
-                    found.ct_content_sha256);
+  require_same_ct(path, wanted.ct, "that of --field", found.ct);
   if (found.mu_water_per_mm != wanted.mu_water_per_mm || found.air_below_hu != wanted.air_below_hu)
     throw InputError("--also-field",
                      path,

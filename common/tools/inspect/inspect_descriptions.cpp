@@ -2,12 +2,14 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <set>
 
 #include "camera_files/camera_formats.h"
 #include "field_use/field_coverage.h"
 #include "files/output_file.h"
 #include "files/sha256.h"
+#include "image_files/ct_reader.h"
 #include "image_files/image_file.h"
 #include "pose_files/pose_file.h"
 #include "study/rig_file.h"
@@ -80,15 +82,19 @@ void require_existing(const fs::path& path) {
   if (!fs::exists(path)) throw FileError(path.string(), "does not exist");
 }
 
-/// What the field of a view covers of the rays that registrations look at, about the case's nominal
-/// pose: those of twice its region.
-void describe_coverage(const StudyCase& study_case,
-                       const StudyView& view,
-                       const CameraGeometry& camera,
-                       ordered_json& json,
-                       std::vector<std::string>& warnings) {
+/// Whether the field of a view is of the case's CT, which is read for the first of them, and what
+/// it covers of the rays that registrations look at, about the case's nominal pose: those of twice
+/// its region.
+void describe_field(const StudyCase& study_case,
+                    const StudyView& view,
+                    const CameraGeometry& camera,
+                    std::optional<CtIdentity>& ct,
+                    ordered_json& json,
+                    std::vector<std::string>& warnings) {
   try {
     const HeldRays field = read_held_rays(*view.field);
+    if (!ct) ct = identity_of(read_ct(study_case.ct, study_case.ct_reading));
+    require_same_ct(view.field->string(), *ct, study_case.ct.string(), field.identity.ct);
     const View needed = View{camera, view.roi}.scaled(kWidestRegionScale);
     const ViewReach reach = field.coverage.reach(needed, study_case.frame(), field.identity.range);
     json["field_camera"] = reach.distance;
@@ -106,6 +112,7 @@ void describe_coverage(const StudyCase& study_case,
 ordered_json view_json(const StudyCase& study_case,
                        const StudyView& view,
                        const CameraRig& rig,
+                       std::optional<CtIdentity>& ct,
                        std::vector<std::string>& warnings) {
   ordered_json json;
   json["camera"] = view.camera;
@@ -124,7 +131,7 @@ ordered_json view_json(const StudyCase& study_case,
   json["field"] = view.field->string();
   // A study is written before its fields are made.
   if (fs::exists(*view.field))
-    describe_coverage(study_case, view, camera, json, warnings);
+    describe_field(study_case, view, camera, ct, json, warnings);
   else
     warnings.push_back("field " + view.field->string() +
                        " does not exist yet; af-precompute --study ... --camera " + view.camera +
@@ -146,8 +153,9 @@ ordered_json case_json(const StudyCase& study_case,
                               vector_json(study_case.target_box_ct.high_mm)};
   json["fiducials"] = study_case.fiducials_ct_mm.size();
   json["has_gold_pose"] = study_case.gold_room_from_ct.has_value();
+  std::optional<CtIdentity> ct;
   for (const StudyView& view : study_case.views)
-    json["views"].push_back(view_json(study_case, view, rig, warnings));
+    json["views"].push_back(view_json(study_case, view, rig, ct, warnings));
   return json;
 }
 

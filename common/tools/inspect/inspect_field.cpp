@@ -2,6 +2,7 @@
 #include "base/error.h"
 #include "field_use/opened_field.h"
 #include "geometry/ray_coverage.h"
+#include "run/input_identity.h"
 #include "text/json_text.h"
 #include "tools/inspect/inspect_kinds.h"
 
@@ -96,7 +97,8 @@ void describe_identity(const FieldIdentity& identity, ordered_json& facts) {
   facts["max_rotation_deg"] = within.max_rotation_rad() * kDegPerRad;
   facts["max_translation_mm"] = within.max_translation_mm();
   if (!identity.range.is_symmetric()) facts["range"] = identity.range.text();
-  facts["ct_content_sha256"] = identity.ct_content_sha256;
+  facts["ct_content_sha256"] = identity.ct.content_sha256;
+  facts["ct_grid"] = to_json(identity.ct.grid);
   facts["mu_water_per_mm"] = identity.mu_water_per_mm;
   facts["air_below_hu"] = identity.air_below_hu;
 }

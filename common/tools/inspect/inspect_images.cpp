@@ -13,6 +13,7 @@
 #include "image_files/image_header.h"
 #include "image_files/itk_image_io.h"
 #include "image_files/stored_image.h"
+#include "run/input_identity.h"
 #include "tools/inspect/inspect_kinds.h"
 
 namespace af {
@@ -89,16 +90,10 @@ std::array<Eigen::Vector3d, 2> outer_box(const CtGrid& grid) {
 
 ordered_json grid_json(const CtGrid& grid) {
   const auto [low, high] = outer_box(grid);
-  ordered_json json;
-  json["size_voxels"] = grid.size;
-  json["spacing_mm"] = vector_json(grid.spacing_mm);
-  json["origin_mm"] = vector_json(grid.origin_mm);
+  ordered_json json = to_json(grid);
   json["axes_point_to"] = {patient_letters(grid.direction.col(0)),
                            patient_letters(grid.direction.col(1)),
                            patient_letters(grid.direction.col(2))};
-  json["direction"] = {vector_json(grid.direction.col(0)),
-                       vector_json(grid.direction.col(1)),
-                       vector_json(grid.direction.col(2))};
   json["center_mm"] = vector_json(grid.center_mm());
   json["right_to_left_mm"] = {low.x(), high.x()};
   json["anterior_to_posterior_mm"] = {low.y(), high.y()};
@@ -229,7 +224,7 @@ void inspect_ct(const fs::path& path, const CtReadOptions& options, Inspection& 
   values["max_hu"] = hu.quantile(1.0);
   values["share_air_below_-900_hu"] = hu.share(-32768, kAirBelowHu);
   values["share_bone_from_300_hu"] = hu.share(kBoneFromHu, 32768);
-  inspection.facts["ct_content_sha256"] = ct_content_sha256(ct);
+  inspection.facts["ct_content_sha256"] = identity_of(ct).content_sha256;
   warn_of_ct(ct, hu, inspection);
 }
 

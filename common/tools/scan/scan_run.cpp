@@ -84,7 +84,7 @@ void run_scan(const ScanOptions& options,
                                  to_toml(options),
                                  options.seed,
                                  world.size(),
-                                 {{"ct_content", ct_content_sha256(scan.ct)}}};
+                                 {{"ct_content", identity_of(scan.ct)}}};
   const std::string found = write_scan_study(options, scan, provenance, folder.path());
   folder.commit();
   std::cout << found << warnings << "\nStudy: " << (folder.final_path() / "study.toml").string()

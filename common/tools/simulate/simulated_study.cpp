@@ -555,7 +555,7 @@ void run_simulate(const SimulateOptions& options,
                                  to_toml(options),
                                  options.seed,
                                  world.size(),
-                                 {{"ct_content", ct_content_sha256(imaged.ct)}}};
+                                 {{"ct_content", identity_of(imaged.ct)}}};
   if (options.cone_beam.views > 0) {
     take_scan(options, imaged, rig, provenance, folder.path());
     folder.commit();

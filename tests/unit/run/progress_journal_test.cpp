@@ -55,6 +55,31 @@ fs::path three_records(const fs::path& folder) {
 
 constexpr int kHeaderBytes = 32;
 
+/// Begun with a CT and a point that follows from it.
+DecidingValues of_ct(double left_mm) {
+  CtIdentity ct{"abc", {}};
+  ct.grid.size = {4, 3, 2};
+  ct.grid.origin_mm.x() = left_mm;
+  return {{"CT 'ct'", ct}, {"center_ct_mm", ct.grid.center_mm()}, {"seed", "1"}};
+}
+
+TEST(ProgressJournal, OfACtGoesOnWithTheSameCtAndWithNoOther) {
+  const test::ScratchFolder folder;
+  append(ProgressJournal(work_in(folder / "p", of_ct(-31.25))), "one");
+  // 1e-3 mm is the same place.
+  EXPECT_THAT(finished(ProgressJournal(work_in(folder / "p", of_ct(-31.2495)))),
+              ElementsAre("one"));
+  try {
+    const ProgressJournal other(work_in(folder / "p", of_ct(-24.25)));
+    ADD_FAILURE();
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("7 mm off: the unfinished work was begun with abc"));
+    EXPECT_THAT(error.what(),
+                HasSubstr("center_ct_mm = [-22.75, 1, 0.5]: the unfinished work was begun with "
+                          "[-29.75, 1, 0.5]"));
+  }
+}
+
 TEST(ProgressJournal, GivesBackWhatEarlierRunsAppended) {
   const test::ScratchFolder folder;
   three_records(folder / "p");

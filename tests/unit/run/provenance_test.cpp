@@ -56,10 +56,27 @@ TEST(Provenance, JsonRecordsTheMakingOfAnOutput) {
   EXPECT_EQ(json["seed"], 7);
   EXPECT_EQ(json["rank_count"], 1);
   EXPECT_EQ(json["input_sha256"]["ct.nii.gz"], std::string(64, 'a'));
+  EXPECT_FALSE(json["input_grids"].contains("ct.nii.gz"));
   EXPECT_FALSE(json["host"]["cpu"].get<std::string>().empty());
   EXPECT_EQ(json["host"]["vector_bits"], static_cast<int>(active_vector_width()));
   const std::regex utc(R"(\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ)");
   EXPECT_TRUE(std::regex_match(json["started_utc"].get<std::string>(), utc));
+}
+
+TEST(Provenance, OfACtRecordsWhereItLies) {
+  CtIdentity ct{"abc", {}};
+  ct.grid.size = {4, 3, 2};
+  ct.grid.origin_mm.x() = -31.25;
+  Provenance provenance = example();
+  provenance.inputs = {{"ct", ct}};
+  const nlohmann::json json = to_json(provenance);
+  EXPECT_EQ(json["input_sha256"]["ct"], "abc");
+  EXPECT_EQ(json["input_grids"]["ct"]["size_voxels"], nlohmann::json({4, 3, 2}));
+  EXPECT_EQ(json["input_grids"]["ct"]["origin_mm"], nlohmann::json({-31.25, 0.0, 0.0}));
+  const test::ScratchFolder folder;
+  write_reproduce_script(folder.path(), provenance);
+  EXPECT_THAT(read_text_file(folder / "reproduce.sh"),
+              HasSubstr("abc, 4 x 3 x 2 voxels from (-31.25, 0, 0) mm to (-28.25, 2, 1) mm  ct"));
 }
 
 TEST(Provenance, JsonRecordsTheVectorWidthInForce) {
@@ -114,7 +131,7 @@ TEST(ReproduceScript, InputNamesCannotLeaveTheirComment) {
   const test::ScratchFolder folder;
   Provenance provenance = example();
   provenance.command_line = "'true'";
-  provenance.input_sha256 = {{"a\ntouch escaped\n", "b\r\ntouch escaped"}};
+  provenance.inputs = {{"a\ntouch escaped\n", "b\r\ntouch escaped"}};
   write_reproduce_script(folder.path(), provenance);
   const WorkingFolder here(folder.path());
   ASSERT_EQ(run("./reproduce.sh"), 0);

@@ -129,7 +129,7 @@ TEST_F(AfSimulate, StressChangesTheXraysButNeitherTruthNorTargetNorRegions) {
   ASSERT_EQ(run(coarse + "--seed 5 " + folder("clean")), 0) << log();
   const Study clean_study = read_study(scratch_ / "clean" / "study.toml");
   const StudyCase& clean = clean_study.find_case("");
-  const std::string hash = ct_content_sha256(read_ct(clean.ct));
+  const std::string hash = identity_of(read_ct(clean.ct)).content_sha256;
   for (const char* stress : {"rods", "fiducials", "heel", "scatter", "noise", "motion"}) {
     ASSERT_EQ(run(coarse + "--seed 5 --force --stress " + stress + " " + folder("s")), 0) << log();
     const Study study = read_study(scratch_ / "s" / "study.toml");
@@ -140,7 +140,7 @@ TEST_F(AfSimulate, StressChangesTheXraysButNeitherTruthNorTargetNorRegions) {
     EXPECT_EQ(hard.views[0].fiducials_px, clean.views[0].fiducials_px) << stress;
     EXPECT_NE(hard.note.find(std::string(stress) + " ("), std::string::npos) << hard.note;
     EXPECT_NE(read_text_file(hard.views[0].xray), read_text_file(clean.views[0].xray)) << stress;
-    EXPECT_EQ(ct_content_sha256(read_ct(hard.ct)), hash) << stress;
+    EXPECT_EQ(identity_of(read_ct(hard.ct)).content_sha256, hash) << stress;
     EXPECT_EQ(read_text_file(scratch_ / "s" / "rig.toml"),
               read_text_file(scratch_ / "clean" / "rig.toml"))
         << stress;
