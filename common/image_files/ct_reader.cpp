@@ -11,6 +11,7 @@
 #include <span>
 
 #include <Eigen/LU>
+#include <Eigen/SVD>
 
 #include "base/error.h"
 #include "base/plausible.h"
@@ -35,10 +36,8 @@ constexpr int kAirBelowHu = -900;
 /// Share of bone that --body-only may remove: more means that the body itself was taken for a
 /// table.
 constexpr double kMostDenseRemoved = 0.1;
-/// From orthonormal; single-precision quaternions and rows of NIfTI stay well below.
-constexpr double kMaxDirectionError = 1e-4;
-/// Between the affine of a NIfTI header and what ITK makes of it, at any corner of the volume.
-constexpr double kMaxAffineDifferenceMm = 0.05;
+/// Of axes from orthonormal: numbers in single precision.
+constexpr double kDirectionRounding = 1e-6;
 /// Weight of what settles ties of axis orders (directions at 45 degrees).
 constexpr double kTieWeight = 1e-2;
 
@@ -83,68 +82,46 @@ CtGrid grid_of(const RawImage& image) {
   return grid;
 }
 
-/// Largest distance between a grid and an affine map (voxel index to RAS mm) over the corners.
-double largest_difference_mm(const CtGrid& grid, const RasAffine& ras_affine) {
-  const auto ras = [&](std::size_t row, const Eigen::Vector3d& index) {
-    const auto& r = ras_affine[row];
-    return r[0] * index.x() + r[1] * index.y() + r[2] * index.z() + r[3];
-  };
+double direction_error(const CtGrid& grid) {
+  const Eigen::Matrix3d gram = grid.direction.transpose() * grid.direction;
+  return (gram - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+}
+
+/// The grid with the nearest orthonormal axes, about the same centre.
+CtGrid straightened(const CtGrid& grid) {
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(grid.direction,
+                                              Eigen::ComputeFullU | Eigen::ComputeFullV);
+  CtGrid straight = grid;
+  straight.direction = svd.matrixU() * svd.matrixV().transpose();
+  straight.origin_mm += grid.center_mm() - straight.center_mm();
+  return straight;
+}
+
+double largest_corner_shift_mm(const CtGrid& a, const CtGrid& b) {
   double largest = 0.0;
   for (unsigned corner = 0; corner < 8; ++corner) {
     Eigen::Vector3d index;
     for (unsigned axis = 0; axis < 3; ++axis)
-      index[axis] = (corner >> axis & 1u) != 0 ? grid.size[axis] - 1 : 0;
-    const Eigen::Vector3d lps(-ras(0, index), -ras(1, index), ras(2, index));
-    const double distance = (lps - grid.point_mm(index)).norm();
-    if (!(distance <= largest)) largest = distance;
+      index[axis] = (corner >> axis & 1u) != 0 ? a.size[axis] - 1 : 0;
+    largest = std::max(largest, (a.point_mm(index) - b.point_mm(index)).norm());
   }
   return largest;
-}
-
-/// NIfTI may hold two maps to the patient, and either may be sheared: says which one is used, and
-/// refuses when it is neither.
-void check_nifti_orientation(const CtGrid& grid,
-                             const NiftiOrientation& orientation,
-                             const std::string& file,
-                             std::vector<std::string>& warnings) {
-  const auto agrees = [&](const std::optional<RasAffine>& affine) {
-    return affine.has_value() && largest_difference_mm(grid, *affine) <= kMaxAffineDifferenceMm;
-  };
-  const bool uses_qform = agrees(orientation.qform);
-  const bool uses_sform = agrees(orientation.sform);
-  if (uses_qform == orientation.qform.has_value() && uses_sform == orientation.sform.has_value())
-    return;
-  if (!uses_qform && !uses_sform)
-    throw InputError(orientation.sform ? "sform" : "qform",
-                     "not rigid with voxel spacing",
-                     "a sheared or scaled grid is not supported; resample the CT",
-                     file);
-  warnings.push_back(file + ": sform and qform place the CT differently; the " +
-                     (uses_qform ? "qform" : "sform") + " is used");
-}
-
-void check_is_ct(const RawImage& image, const fs::path& path) {
-  check_is_scalar_volume(image, path);
-  require_sound_grid(grid_of(image), path.string());
 }
 
 void add_values(ValueType type, std::span<const std::byte> bytes, HuValues& values) {
   visit_values(type, bytes, [&](const auto span) { values.add_all(span); });
 }
 
-/// Converts the voxels piece by piece while the file is read and checked, in one pass. The image
-/// returned holds no values.
-RawImage read_values(const fs::path& path,
-                     const ImageHeader& header,
-                     HuValues& values,
-                     std::vector<std::string>& warnings) {
-  RawImage image =
-      read_image_description(path, header, [&](const RawImage& seen) { check_is_ct(seen, path); });
+/// Converts the voxels piece by piece while the file is read and checked, in one pass.
+void read_values(const fs::path& path,
+                 const ImageHeader& header,
+                 const RawImage& image,
+                 HuValues& values,
+                 std::vector<std::string>& warnings) {
   read_described_values(path, header, image, &warnings, [&](std::span<const std::byte> piece) {
     if (values.hu().empty()) values.reserve(image.voxel_count());
     add_values(image.type, piece, values);
   });
-  return image;
 }
 
 CtVolume read_ct_image(const fs::path& path, HuValues& values, std::vector<std::string>& warnings) {
@@ -165,11 +142,12 @@ CtVolume read_ct_image(const fs::path& path, HuValues& values, std::vector<std::
   const ImageHeader header = read_image_header(path, *format);
   if (!header.has_spacing)
     throw InputError("spacing", "none", "a CT's header must state it (mm)", file);
-  const RawImage image = read_values(path, header, values, warnings);
+  const RawImage image = image_description(header);
+  check_is_scalar_volume(image, path);
   CtVolume ct;
-  ct.grid = grid_of(image);
-  if (header.format == ImageFormat::Nifti && header.has_orientation)
-    check_nifti_orientation(ct.grid, header.nifti, file, warnings);
+  ct.grid = sound_grid(grid_of(image), file, &warnings);
+  warnings.insert(warnings.end(), header.warnings.begin(), header.warnings.end());
+  read_values(path, header, image, values, warnings);
   if (!header.has_orientation)
     warnings.push_back(file + ": no patient orientation is stored; axes are taken as LPS by " +
                        std::string(format_name(*format)) + "'s default");
@@ -327,7 +305,7 @@ CtVolume read_ct(const fs::path& path,
     DicomCt series = read_dicom_series(path, options, &found);
     ct.grid = series.grid;
     values = std::move(series.values);
-    require_sound_grid(ct.grid, path.string());
+    ct.grid = sound_grid(ct.grid, path.string(), &found);
   } else {
     ct = read_ct_image(path, values, found);
   }
@@ -346,7 +324,7 @@ std::string ct_frame_of_reference(const fs::path& path, const CtReadOptions& opt
                                : std::string();
 }
 
-void require_sound_grid(const CtGrid& grid, const std::string& file) {
+CtGrid sound_grid(const CtGrid& grid, const std::string& file, std::vector<std::string>* warnings) {
   std::vector<std::string> problems;
   const auto extent = [&](std::size_t axis) { return static_cast<std::uint64_t>(grid.size[axis]); };
   if (std::ranges::min(grid.size) < 2)
@@ -359,13 +337,22 @@ void require_sound_grid(const CtGrid& grid, const std::string& file) {
   if (!(grid.origin_mm.cwiseAbs().maxCoeff() <= kMaxCtOriginMm))
     problems.push_back("origin = " + triple(grid.origin_mm) +
                        " mm: must be finite and within 1e4 mm (10 m)");
-  const Eigen::Matrix3d gram = grid.direction.transpose() * grid.direction;
-  if (!((gram - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() <= kMaxDirectionError))
+  if (!(direction_error(grid) <= kMaxDirectionError))
     problems.push_back("direction columns " + triple(grid.direction.col(0)) + ", " +
                        triple(grid.direction.col(1)) + ", " + triple(grid.direction.col(2)) +
                        ": must be orthonormal (a sheared or scaled grid is not supported; resample "
                        "the CT)");
   throw_if_any(problems, file);
+  if (direction_error(grid) <= kDirectionRounding) return grid;
+  const CtGrid straight = straightened(grid);
+  const double shift_mm = largest_corner_shift_mm(grid, straight);
+  if (shift_mm > kSamePlaceMm && warnings != nullptr)
+    warnings->push_back(file +
+                        ": its axes are not quite orthonormal; the nearest that are place its "
+                        "corners up to " +
+                        number_text(std::round(shift_mm * 1e3) / 1e3) +
+                        " mm from where the file does");
+  return straight;
 }
 
 void write_ct(const CtVolume& ct, const fs::path& path) {

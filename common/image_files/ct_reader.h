@@ -29,9 +29,13 @@ CtVolume read_ct(const std::filesystem::path& path,
 /// is damaged.
 std::string ct_frame_of_reference(const std::filesystem::path& path, const CtReadOptions& options);
 
-/// InputError naming `file` for a grid that read_ct() would refuse: too few voxels, an implausible
-/// spacing or origin, axes that are not orthonormal.
-void require_sound_grid(const CtGrid& grid, const std::string& file);
+/// The grid that read_ct() takes for a stated one: axes within kMaxDirectionError of orthonormal
+/// become so, with a warning when that moves a corner by more than kSamePlaceMm. InputError naming
+/// `file` for a grid that it would refuse: too few voxels, an implausible spacing or origin, other
+/// axes.
+CtGrid sound_grid(const CtGrid& grid,
+                  const std::string& file,
+                  std::vector<std::string>* warnings = nullptr);
 
 /// Writes a CT (int16) by extension (.mha .nii.gz .nrrd), atomically.
 void write_ct(const CtVolume& ct, const std::filesystem::path& path);

@@ -94,8 +94,8 @@ struct Encoding {
 
 /// Group 0028 elements that are unsigned short in implicit files, whose forms are not written.
 bool is_unsigned_short(DicomTag tag) {
-  constexpr std::array<std::uint16_t, 7> kElements = {
-      0x0002, 0x0010, 0x0011, 0x0100, 0x0101, 0x0102, 0x0103};
+  constexpr std::array<std::uint16_t, 9> kElements = {
+      0x0002, 0x0010, 0x0011, 0x0100, 0x0101, 0x0102, 0x0103, 0x0120, 0x0121};
   return tag.first == 0x0028 &&
          std::find(kElements.begin(), kElements.end(), tag.second) != kElements.end();
 }
@@ -210,6 +210,7 @@ class DicomWalker {
     if (header.tag.first == 0xfffe) fail("an item outside of a sequence");
     if (depth == 0) elements_.tags_.insert(header.tag);
     const bool is_pixels = depth == 0 && header.tag == kPixelData;
+    if (is_pixels) elements_.has_pixel_words_ = header.form != "OB";
     if (header.length == kUndefinedLength) {
       if (is_pixels)
         read_fragments(encoding, end);

@@ -62,6 +62,8 @@ class DicomElements {
   [[nodiscard]] bool has_pixels() const { return !pixel_parts_.empty(); }
   [[nodiscard]] bool has_compressed_pixels() const { return has_compressed_pixels_; }
   [[nodiscard]] bool is_big_endian() const { return is_big_endian_; }
+  /// Whether pixels of 8 bits stand in words of two, whose bytes the byte order turns round.
+  [[nodiscard]] bool has_pixel_words() const { return has_pixel_words_; }
   /// Where pixel data stand: one part, or the fragments of an encoded stream (the first is its
   /// offset table).
   [[nodiscard]] const std::vector<DicomPart>& pixel_parts() const { return pixel_parts_; }
@@ -82,6 +84,7 @@ class DicomElements {
   DicomValues values_;
   bool has_compressed_pixels_ = false;
   bool is_big_endian_ = false;
+  bool has_pixel_words_ = false;
   std::vector<DicomPart> pixel_parts_;
 };
 

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "image_files/dicom_pixels.h"
 
+#include <algorithm>
 #include <cstring>
 #include <gdcmImageReader.h>
 #include <gdcmTrace.h>
+#include <limits>
 #include <span>
 #include <string>
 #include <utility>
@@ -18,6 +20,8 @@ namespace {
 
 constexpr double kMaxSidePx = 65535.0;
 constexpr double kMaxFrames = 100000.0;
+constexpr DicomTag kPaddingValue = {0x0028, 0x0120};
+constexpr DicomTag kPaddingLimit = {0x0028, 0x0121};
 
 void silence_gdcm() {
   static const bool done = [] {
@@ -74,6 +78,30 @@ void read_bit_layout(const DicomElements& header, DicomPixelLayout& layout) {
   layout.is_signed = required_integer(header, {0x0028, 0x0103}, "PixelRepresentation", 0, 1) == 1;
 }
 
+/// The lowest `bits` of a number, with the sign that they have.
+std::int64_t number_of_bits(std::int64_t number, int bits, bool is_signed) {
+  const std::int64_t range = std::int64_t{1} << bits;
+  const std::int64_t value = number & (range - 1);
+  return is_signed && value >= range / 2 ? value - range : value;
+}
+
+/// Files state it as signed or not whatever their pixels are, so its bits count. The limit may be
+/// the lower end (PS3.3, C.7.5.1.1.2).
+void read_padding(const DicomElements& header, DicomPixelLayout& layout) {
+  if (header.text(kPaddingValue).empty()) return;
+  const auto stored = [&](DicomTag tag, const char* name) {
+    constexpr int kElementBits = 16;
+    return number_of_bits(required_integer(header, tag, name, -32768.0, 65535.0),
+                          std::min(layout.allocated_bits, kElementBits),
+                          layout.is_signed);
+  };
+  const std::int64_t value = stored(kPaddingValue, "PixelPaddingValue (0028,0120)");
+  const std::int64_t limit = header.text(kPaddingLimit).empty()
+                                 ? value
+                                 : stored(kPaddingLimit, "PixelPaddingRangeLimit (0028,0121)");
+  layout.padding = std::minmax({value, limit});
+}
+
 std::size_t pixel_count(const DicomPixelLayout& layout) {
   return static_cast<std::size_t>(layout.columns) * static_cast<std::size_t>(layout.rows);
 }
@@ -91,9 +119,12 @@ void check_bytes(const DicomElements& header, const DicomPixelLayout& layout) {
                     "pixel data",
                     std::to_string(expected) + " bytes",
                     std::to_string(header.pixel_bytes()));
-  // No lossless codec packs an image with noise this tightly; a header that says so lies.
+  // No lossless codec packs an image with noise this tightly, but a blank one takes next to
+  // nothing. So memory beyond that of any detector's frame is not taken on the header's word.
   constexpr std::uint64_t kMaxCompression = 1000;
-  if (expected / kMaxCompression > header.pixel_bytes())
+  constexpr std::size_t kLargestBlankFrame = std::size_t{1} << 27;
+  if (decoded_bytes(layout) > kLargestBlankFrame &&
+      expected / kMaxCompression > header.pixel_bytes())
     throw FileError(file,
                     "compressed pixel data",
                     "at least " + std::to_string(expected / kMaxCompression) + " bytes",
@@ -202,25 +233,103 @@ std::vector<char> decompressed(const DicomPixelLayout& layout) {
   return std::move(decoding.bytes);
 }
 
-/// Cuts the stored bits out of the allocated ones, extends the sign, and rescales.
-std::vector<double> rescaled(const std::vector<char>& raw,
-                             bool is_big_endian,
-                             const DicomPixelLayout& layout) {
+/// What pixels hold before the rescale.
+struct StoredPixels {
+  std::vector<std::int64_t> values;
+  std::vector<bool> is_padding;
+};
+
+/// Cuts the stored bits out of the allocated ones and extends the sign. Padding that does not fit
+/// into the stored bits is looked for in all of them.
+StoredPixels stored_pixels(const std::vector<char>& raw,
+                           bool is_big_endian,
+                           const DicomPixelLayout& layout) {
   const auto pixel_bytes = static_cast<std::size_t>(layout.allocated_bits) / 8;
+  const bool has_turned_words =
+      is_big_endian && pixel_bytes == 1 && layout.header.has_pixel_words();
   const int shift = layout.high_bit + 1 - layout.stored_bits;
-  const std::int64_t range = std::int64_t{1} << layout.stored_bits;
-  std::vector<double> values(pixel_count(layout));
-  for (std::size_t i = 0; i < values.size(); ++i) {
+  const auto stored = [&](std::int64_t bits) {
+    return number_of_bits(bits >> shift, layout.stored_bits, layout.is_signed);
+  };
+  const auto [low, high] = layout.padding.value_or(std::pair<std::int64_t, std::int64_t>(1, 0));
+  const bool fits = low == number_of_bits(low, layout.stored_bits, layout.is_signed) &&
+                    high == number_of_bits(high, layout.stored_bits, layout.is_signed);
+  StoredPixels pixels;
+  pixels.values.resize(pixel_count(layout));
+  pixels.is_padding.resize(pixels.values.size());
+  for (std::size_t i = 0; i < pixels.values.size(); ++i) {
     std::uint32_t bits = 0;
     for (std::size_t byte = 0; byte < pixel_bytes; ++byte) {
       const std::size_t at = is_big_endian ? byte : pixel_bytes - 1 - byte;
-      bits = bits << 8 | static_cast<unsigned char>(raw[i * pixel_bytes + at]);
+      const std::size_t place = i * pixel_bytes + at;
+      bits = bits << 8 | static_cast<unsigned char>(
+                             raw[has_turned_words ? std::min(place ^ 1, raw.size() - 1) : place]);
     }
-    std::int64_t value = std::int64_t{bits >> shift} & (range - 1);
-    if (layout.is_signed && value >= range / 2) value -= range;
-    values[i] = static_cast<double>(value) * layout.slope + layout.intercept;
+    pixels.values[i] = stored(bits);
+    const std::int64_t compared =
+        fits ? pixels.values[i] : number_of_bits(bits, layout.allocated_bits, layout.is_signed);
+    pixels.is_padding[i] = compared >= low && compared <= high;
   }
-  return values;
+  return pixels;
+}
+
+/// Whether other pixels hold values below and above those of padding, against what DICOM says of
+/// it.
+bool is_amid_data(const StoredPixels& pixels, const DicomPixelLayout& layout) {
+  bool has_lower = false;
+  bool has_higher = false;
+  for (std::size_t i = 0; i < pixels.values.size(); ++i) {
+    if (pixels.is_padding[i]) continue;
+    has_lower = has_lower || pixels.values[i] < layout.padding->first;
+    has_higher = has_higher || pixels.values[i] > layout.padding->second;
+  }
+  return has_lower && has_higher;
+}
+
+/// Leaves of the padding what is connected (4 neighbours) with the picture's edge.
+std::vector<bool> part_at_edge(const std::vector<bool>& is_padding, std::size_t columns) {
+  const std::size_t count = is_padding.size();
+  std::vector<bool> found(count);
+  std::vector<std::size_t> next;
+  const auto visit = [&](std::size_t at) {
+    if (!is_padding[at] || found[at]) return;
+    found[at] = true;
+    next.push_back(at);
+  };
+  for (std::size_t at = 0; at < count; ++at)
+    if (at < columns || at + columns >= count || at % columns == 0 || (at + 1) % columns == 0)
+      visit(at);
+  while (!next.empty()) {
+    const std::size_t at = next.back();
+    next.pop_back();
+    if (at % columns != 0) visit(at - 1);
+    if ((at + 1) % columns != 0) visit(at + 1);
+    if (at >= columns) visit(at - columns);
+    if (at + columns < count) visit(at + columns);
+  }
+  return found;
+}
+
+DicomPixels rescaled(const std::vector<char>& raw,
+                     bool is_big_endian,
+                     const DicomPixelLayout& layout) {
+  StoredPixels stored = stored_pixels(raw, is_big_endian, layout);
+  DicomPixels pixels;
+  if (layout.padding && is_amid_data(stored, layout)) {
+    const auto all = std::count(stored.is_padding.begin(), stored.is_padding.end(), true);
+    stored.is_padding = part_at_edge(stored.is_padding, static_cast<std::size_t>(layout.columns));
+    pixels.doubtful = static_cast<std::size_t>(
+        all - std::count(stored.is_padding.begin(), stored.is_padding.end(), true));
+  }
+  pixels.values.reserve(stored.values.size());
+  for (std::size_t i = 0; i < stored.values.size(); ++i) {
+    if (stored.is_padding[i]) ++pixels.padded;
+    pixels.values.push_back(stored.is_padding[i]
+                                ? std::numeric_limits<double>::quiet_NaN()
+                                : static_cast<double>(stored.values[i]) * layout.slope +
+                                      layout.intercept);
+  }
+  return pixels;
 }
 
 }  // namespace
@@ -230,6 +339,11 @@ std::pair<double, double> DicomPixelLayout::value_range() const {
   const std::int64_t low = is_signed ? -range / 2 : 0;
   return {static_cast<double>(low) * slope + intercept,
           static_cast<double>(low + range - 1) * slope + intercept};
+}
+
+std::string DicomPixelLayout::padding_text() const {
+  const std::string limit = header.text(kPaddingLimit);
+  return "PixelPaddingValue " + header.text(kPaddingValue) + (limit.empty() ? "" : " to " + limit);
 }
 
 DicomPixelLayout dicom_pixel_layout(const DicomElements& header) {
@@ -268,11 +382,12 @@ DicomPixelLayout dicom_frame_layout(const DicomElements& header, std::optional<i
   layout.slope = slope.value_or(1.0);
   layout.intercept = intercept.value_or(0.0);
   read_bit_layout(header, layout);
+  read_padding(header, layout);
   check_bytes(header, layout);
   return layout;
 }
 
-std::vector<double> read_dicom_pixels(const DicomPixelLayout& layout) {
+DicomPixels read_dicom_pixels(const DicomPixelLayout& layout) {
   if (layout.header.has_compressed_pixels()) return rescaled(decompressed(layout), false, layout);
   DicomPart part = layout.header.pixel_parts().front();
   part.bytes = static_cast<std::uint32_t>(decoded_bytes(layout));  // fits: the part holds it

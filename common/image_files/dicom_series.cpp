@@ -7,6 +7,7 @@
 #include <map>
 #include <optional>
 #include <sstream>
+#include <utility>
 
 #include <Eigen/Geometry>
 
@@ -163,8 +164,8 @@ void check_is_plain_ct(const DicomElements& header, std::vector<std::string>* wa
   const std::string file = header.path().string();
   if (const std::string modality = header.text({0x0008, 0x0060}); modality != "CT")
     throw InputError("Modality", "'" + modality + "'", "must be CT", file);
-  if (const std::string meaning = header.text({0x0028, 0x0004}); meaning != "MONOCHROME2")
-    throw InputError("PhotometricInterpretation", "'" + meaning + "'", "must be MONOCHROME2", file);
+  if (header.text({0x0028, 0x0004}) == "MONOCHROME1")
+    warn(warnings, file + ": MONOCHROME1 says how greys are shown; HU are those of the rescale");
   if (const std::string units = header.text({0x0028, 0x1054}); !units.empty() && units != "HU")
     warn(warnings, file + ": RescaleType = '" + units + "', read as HU");
 }
@@ -249,6 +250,56 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
+/// The unit of the last decimal that any of some numbers is written with; 0 when one has an
+/// exponent.
+double last_decimal(const std::vector<std::string>& numbers) {
+  std::size_t most = 0;
+  for (const std::string& number : numbers) {
+    if (number.find_first_of("eE") != std::string::npos) return 0.0;
+    const std::size_t point = number.find('.');
+    const std::size_t last = number.find_last_not_of("0 ");
+    if (point != std::string::npos && last != std::string::npos && last > point)
+      most = std::max(most, last - point);
+  }
+  return std::pow(10.0, -static_cast<double>(most));
+}
+
+/// How far rounding of the slices' positions may have moved a slice against the first and the last
+/// one: half of the last decimal, twice.
+double position_rounding_mm(const std::vector<Slice>& slices, const Eigen::Vector3d& normal) {
+  double rounding = 0.0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::vector<std::string> numbers;
+    for (const Slice& slice : slices) {
+      std::istringstream parts(slice.pixels.header.text({0x0020, 0x0032}));
+      std::string number;
+      for (std::size_t part = 0; part <= axis; ++part) std::getline(parts, number, '\\');
+      numbers.push_back(number);
+    }
+    rounding += std::abs(normal[static_cast<Eigen::Index>(axis)]) * last_decimal(numbers);
+  }
+  return rounding;
+}
+
+/// Whether slices are even but for the rounding of their positions, which stays below what shifts
+/// of slices are allowed, on either side. A missing slice of four or more puts another one at least
+/// a third of the spacing beside the even grid, which rounding by kMostGapShare of it cannot do.
+bool is_even_but_rounded(const std::vector<Slice>& slices,
+                         const Eigen::Vector3d& normal,
+                         const std::vector<double>& heights) {
+  constexpr double kMostGapShare = 0.25;
+  constexpr double kArithmetic = 1e-6;
+  const double spacing =
+      (heights.back() - heights.front()) / static_cast<double>(heights.size() - 1);
+  const double rounding = position_rounding_mm(slices, normal) + kArithmetic;
+  if (rounding > std::min(2.0 * kMaxDriftMm + 2.0 * kArithmetic, kMostGapShare * spacing))
+    return false;
+  for (std::size_t i = 0; i < heights.size(); ++i)
+    if (std::abs(heights[i] - heights.front() - static_cast<double>(i) * spacing) > rounding)
+      return false;
+  return true;
+}
+
 /// Why slices are not evenly spaced; empty when they are. InputError for two at one position.
 /// `heights` ascend.
 std::string unevenness(const fs::path& folder,
@@ -257,21 +308,22 @@ std::string unevenness(const fs::path& folder,
   std::vector<double> gaps;
   for (std::size_t i = 1; i < heights.size(); ++i) gaps.push_back(heights[i] - heights[i - 1]);
   const double usual = median(gaps);
-  std::string found;
+  std::size_t worst = 0;
+  const auto deviation = [&](std::size_t gap) { return std::abs(gaps[gap] - usual); };
   for (std::size_t i = 0; i < gaps.size(); ++i) {
     if (gaps[i] < kUnevenMm)
       throw InputError(folder.string() + ": two slices at one position, " +
                        place(i + 1, heights[i + 1]) +
                        " along the slice normal: " + slices[i].pixels.path().filename().string() +
                        " and " + slices[i + 1].pixels.path().filename().string());
-    if (!found.empty() || std::abs(gaps[i] - usual) <= std::max(kUnevenShare * usual, kUnevenMm))
-      continue;
-    found = "between " + place(i, heights[i]) + " and " + place(i + 1, heights[i + 1]) +
-            " the distance is " + number(gaps[i]) + " mm, elsewhere " + number(usual) + " mm: " +
-            (gaps[i] > 1.5 * usual ? "a slice is missing" : "slices are not evenly spaced") +
-            " (positions along the slice normal)";
+    if (deviation(i) > deviation(worst)) worst = i;
   }
-  return found;
+  if (deviation(worst) <= std::max(kUnevenShare * usual, kUnevenMm)) return {};
+  return "between " + place(worst, heights[worst]) + " and " +
+         place(worst + 1, heights[worst + 1]) + " the distance is " + number(gaps[worst]) +
+         " mm, elsewhere " + number(usual) + " mm: " +
+         (gaps[worst] > 1.5 * usual ? "a slice is missing" : "slices are not evenly spaced") +
+         " (positions along the slice normal)";
 }
 
 /// Why slices do not stand straight above each other; empty when they do.
@@ -305,7 +357,8 @@ std::string tilt_of_tags(const std::vector<Slice>& slices) {
 /// Slices in their order, and where they lie.
 struct PlacedSlices {
   SliceStack stack;
-  std::string trouble;  ///< why they are no upright, even grid; empty when they are
+  std::string trouble;   ///< why they are no upright, even grid; empty when they are
+  std::string rounding;  ///< what was taken for rounding of their positions; or empty
   double largest_gap_mm = 0.0;
   double usual_gap_mm = 0.0;
 };
@@ -331,6 +384,8 @@ PlacedSlices placed(const fs::path& folder, std::vector<Slice>& slices) {
   stack.columns = slices.front().pixels.columns;
   stack.rows = slices.front().pixels.rows;
   found.trouble = unevenness(folder, slices, heights);
+  if (!found.trouble.empty() && is_even_but_rounded(slices, normal, heights))
+    found.rounding = std::exchange(found.trouble, {});
   if (found.trouble.empty()) found.trouble = leaning(slices, normal);
   return found;
 }
@@ -372,6 +427,49 @@ CtGrid repaired_grid(const fs::path& folder, const PlacedSlices& slices) {
   return grid;
 }
 
+/// Adds the slices' pixels to a CT: padding becomes air, whatever its value means.
+class VoxelCollector {
+ public:
+  explicit VoxelCollector(HuValues& values) : values_(values) {}
+
+  void add(const DicomPixelLayout& layout) {
+    constexpr double kAirHu = -1000.0;
+    constexpr double kAttenuatesFromHu = -900.0;
+    const DicomPixels pixels = read_dicom_pixels(layout);
+    for (const double value : pixels.values)
+      if (std::isnan(value))
+        values_.add_hu(kAirHu);
+      else
+        values_.add(value);
+    if (pixels.padded + pixels.doubtful > 0 && text_.empty()) text_ = layout.padding_text();
+    doubtful_ += pixels.doubtful;
+    const auto [low, high] = layout.padding.value_or(std::pair<std::int64_t, std::int64_t>());
+    const auto is_dense = [&](std::int64_t stored) {
+      return static_cast<double>(stored) * layout.slope + layout.intercept >= kAttenuatesFromHu;
+    };
+    if (is_dense(low) || is_dense(high)) padded_ += pixels.padded;
+  }
+
+  /// Of padding that would not have been air by its value, and of what is no padding after all.
+  void warn_of_padding(const std::string& folder, std::vector<std::string>* warnings) const {
+    if (padded_ > 0)
+      warn(warnings,
+           folder + ": " + std::to_string(padded_) + " voxels of " + text_ +
+               " are padding and were made air");
+    if (doubtful_ > 0)
+      warn(warnings,
+           folder + ": " + std::to_string(doubtful_) + " voxels of " + text_ +
+               " away from the slices' edges are read as they are: other voxels hold lower and "
+               "higher values, so this one is no mark of padding");
+  }
+
+ private:
+  HuValues& values_;
+  std::string text_;
+  std::size_t padded_ = 0;
+  std::size_t doubtful_ = 0;
+};
+
 }  // namespace
 
 bool holds_dicom(const fs::path& folder) {
@@ -405,17 +503,24 @@ DicomCt read_dicom_series(const fs::path& folder,
   if (places.trouble.empty() && !tag.empty())
     warn(warnings, tag + ", but the slices' positions show no tilt; the positions are trusted");
   const bool is_repaired = !places.trouble.empty();
+  if (!places.rounding.empty())
+    warn(warnings,
+         folder.string() + ": " + places.rounding + "; this is within the rounding of " +
+             "ImagePositionPatient, so the slices are taken as even, " +
+             number(stored_grid(places.stack).spacing_mm.z()) + " mm apart");
   DicomCt ct;
   ct.values = HuValues{HuConversion(options)};
   ct.grid = is_repaired ? repaired_grid(folder, places) : stored_grid(places.stack);
   if (ct.grid.voxel_count() > kMaxVoxels)
     throw InputError(folder.string() + ": more than " + std::to_string(kMaxVoxels) + " voxels");
   const std::size_t stored_voxels = stored_grid(places.stack).voxel_count();
+  VoxelCollector voxels(ct.values);
   for (const Slice& slice : slices) {
-    for (const double value : read_dicom_pixels(slice.pixels)) ct.values.add(value);
+    voxels.add(slice.pixels);
     // Only now is it known that the pixels are there which the headers promise.
     ct.values.reserve(stored_voxels);
   }
+  voxels.warn_of_padding(folder.string(), warnings);
   if (!is_repaired) return ct;
   if (ct.values.non_finite_count() + ct.values.implausible_count() > 0) {
     ct.grid = stored_grid(places.stack);  // the caller names the voxel of the file

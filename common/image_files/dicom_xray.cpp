@@ -99,21 +99,36 @@ void apply_modality_lut(const DicomPixelLayout& layout, DicomXray& xray) {
   }
 }
 
-Image2d image_of(const DicomPixelLayout& layout) {
-  const std::vector<double> values = read_dicom_pixels(layout);
-  Image2d image(layout.columns, layout.rows);
-  std::transform(values.begin(), values.end(), image.pixels.begin(), [](const double value) {
-    return static_cast<float>(value);
-  });
-  const auto bad = std::find_if_not(
-      image.pixels.begin(), image.pixels.end(), [](float value) { return std::isfinite(value); });
-  if (bad != image.pixels.end())
+void read_pixels(const DicomPixelLayout& layout, DicomXray& xray) {
+  const DicomPixels pixels = read_dicom_pixels(layout);
+  const std::string file = layout.path().string();
+  if (pixels.padded == pixels.values.size())
+    throw InputError("pixels", "all of " + layout.padding_text(), "nothing but padding", file);
+  xray.image = Image2d(layout.columns, layout.rows);
+  std::transform(pixels.values.begin(),
+                 pixels.values.end(),
+                 xray.image.pixels.begin(),
+                 [](const double value) { return static_cast<float>(value); });
+  if (pixels.padded > 0) {
+    xray.padding = layout.padding_text();
+    xray.data = Image2d(layout.columns, layout.rows);
+    const auto first = std::find_if_not(
+        pixels.values.begin(), pixels.values.end(), [](double v) { return std::isnan(v); });
+    for (std::size_t i = 0; i < pixels.values.size(); ++i) {
+      const bool is_data = !std::isnan(pixels.values[i]);
+      xray.data.pixels[i] = is_data ? 1.0f : 0.0f;
+      if (!is_data) xray.image.pixels[i] = static_cast<float>(*first);
+    }
+  }
+  const auto bad = std::find_if_not(xray.image.pixels.begin(),
+                                    xray.image.pixels.end(),
+                                    [](float value) { return std::isfinite(value); });
+  if (bad != xray.image.pixels.end())
     throw InputError("RescaleSlope, RescaleIntercept",
                      "'" + layout.header.text({0x0028, 0x1053}) + "', '" +
                          layout.header.text({0x0028, 0x1052}) + "'",
                      "must give finite values",
-                     layout.path().string());
-  return image;
+                     file);
 }
 
 }  // namespace
@@ -135,15 +150,18 @@ DicomXray read_dicom_xray(const std::filesystem::path& path, std::optional<int> 
     xray.window = center + "/" + header.text(kWindowWidth);
   const auto [low, high] = layout.value_range();
   xray.inversion_sum = low + high;
-  xray.imager_spacing_mm = imager_spacing_mm(header, xray.frame);
-  xray.pixel_spacing_mm =
-      dicom_spacing_mm(header.values(), kPixelSpacing, "PixelSpacing", path.string());
   if (const DicomValues* const luts = functional_group(header, xray.frame, kIntensityLuts);
       luts != nullptr)
     xray.intensity_function = luts->text(kLutFunction);
-  xray.image = image_of(layout);
+  read_pixels(layout, xray);
   if (header.has(kModalityLut)) apply_modality_lut(layout, xray);
+  xray.header = header;
   return xray;
+}
+
+std::optional<Eigen::Vector2d> xray_pixel_spacing_mm(const DicomXray& xray) {
+  return dicom_spacing_mm(
+      xray.header.values(), kPixelSpacing, "PixelSpacing", xray.header.path().string());
 }
 
 }  // namespace af

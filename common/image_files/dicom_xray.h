@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 #include "image/image2d.h"
+#include "image_files/dicom_elements.h"
 
 namespace af {
 
@@ -17,7 +18,10 @@ enum class PixelIntensity { NotStated, Linear, Logarithmic, Display, Other };
 
 /// One frame of a DICOM X-ray (XA, RF, CR, DX, ...) and what the file says of its values.
 struct DicomXray {
-  Image2d image;         ///< rescaled; neither inverted nor windowed; row 0 on top
+  DicomElements header;
+  Image2d image;  ///< rescaled; neither inverted nor windowed; row 0 on top
+  Image2d data;   ///< 0 where a pixel is padding (PixelPaddingValue), 1 elsewhere; empty: none is
+  std::string padding;   ///< what padding is, for messages
   std::string modality;  ///< empty when the file does not state it
   int frame = 1;
   int frames = 1;
@@ -39,16 +43,16 @@ struct DicomXray {
   /// Sum of the lowest and highest value that a pixel can hold: what a value is subtracted from to
   /// turn white into black.
   double inversion_sum = 0.0;
-  /// Column, row; of the detector's plane (ImagerPixelSpacing).
-  std::optional<Eigen::Vector2d> imager_spacing_mm;
-  /// Column, row; PixelSpacing, which may be that of a plane in the patient.
-  std::optional<Eigen::Vector2d> pixel_spacing_mm;
 };
 
 /// Reads frame `frame` (from 1) of a DICOM image file; without it there must be one frame only.
 /// Errors as read_image(); InputError also for a PixelIntensityRelationshipSign that is not 1 or
-/// -1, a pixel spacing that is not positive and a Modality LUT that is broken or stands beside a
-/// rescale.
+/// -1, a Modality LUT that is broken or stands beside a rescale, and a picture that is nothing but
+/// padding. Pixel spacings are left to imager_spacing_mm() and xray_pixel_spacing_mm().
 DicomXray read_dicom_xray(const std::filesystem::path& path, std::optional<int> frame);
+
+/// Column, row; PixelSpacing, which may be that of a plane in the patient. InputError when it is
+/// not two positive numbers.
+std::optional<Eigen::Vector2d> xray_pixel_spacing_mm(const DicomXray& xray);
 
 }  // namespace af

@@ -114,11 +114,17 @@ void check_is_finite(const Image2d& image, const fs::path& path) {
 
 Image2d read_dicom_image(const fs::path& path) {
   const DicomPixelLayout layout = dicom_pixel_layout(DicomElements::read(path));
-  const std::vector<double> values = read_dicom_pixels(layout);
+  const DicomPixels pixels = read_dicom_pixels(layout);
+  if (pixels.padded > 0)
+    throw InputError(layout.padding_text(),
+                     std::to_string(pixels.padded) + " pixels",
+                     "are padding, and here every pixel must have a value",
+                     path.string());
   Image2d image(layout.columns, layout.rows);
-  std::transform(values.begin(), values.end(), image.pixels.begin(), [](const double value) {
-    return static_cast<float>(value);
-  });
+  std::transform(
+      pixels.values.begin(), pixels.values.end(), image.pixels.begin(), [](const double value) {
+        return static_cast<float>(value);
+      });
   check_is_finite(image, path);
   return image;
 }
@@ -140,7 +146,7 @@ ImageWithSpacing read_image_with_spacing(const fs::path& path) {
         path.string(),
         "not an image: its content is none of MetaImage, NIfTI, NRRD, TIFF, PNG, DICOM" +
             foreign_content(path));
-  if (*format == ImageFormat::Dicom) return {read_dicom_image(path), std::nullopt};
+  if (*format == ImageFormat::Dicom) return {read_dicom_image(path), std::nullopt, {}};
   const ImageHeader header = read_image_header(path, *format);
   const RawImage raw = read_stored_image(
       path, header, nullptr, [&](const RawImage& seen) { check_is_2d(seen, path); });
@@ -154,7 +160,7 @@ ImageWithSpacing read_image_with_spacing(const fs::path& path) {
   std::optional<Eigen::Vector2d> spacing_mm;
   if (*format != ImageFormat::Png && *format != ImageFormat::Tiff && header.has_spacing)
     spacing_mm = Eigen::Vector2d(raw.spacing_mm[0], raw.spacing_mm[1]);
-  return {std::move(image), spacing_mm};
+  return {std::move(image), spacing_mm, raw.note};
 }
 
 void for_each_image_of_stack(const fs::path& path,
@@ -169,8 +175,8 @@ void for_each_image_of_stack(const fs::path& path,
                      "must be MetaImage, NRRD or NIfTI; convert it, or give one file per image",
                      path.string());
   const ImageHeader header = read_image_header(path, *format);
-  const RawImage description = read_image_description(
-      path, header, [&](const RawImage& seen) { check_is_stack(seen, path); });
+  const RawImage description = image_description(header);
+  check_is_stack(description, path);
   const auto empty = [&] {
     return Image2d(static_cast<int>(description.size[0]), static_cast<int>(description.size[1]));
   };

@@ -6,6 +6,7 @@
 #include <functional>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include <Eigen/Core>
@@ -15,9 +16,9 @@
 namespace af {
 
 /// Reads a 2-D image of any ITK format (mha, nii.gz, nrrd, tif, png 8/16-bit, single-slice DICOM)
-/// as float, row 0 on top, values as stored (a DICOM file's own rescale is applied). FileError when
-/// it cannot be parsed or is truncated; InputError when it is not 2-D, has several channels or
-/// pixels that are not finite.
+/// as float, row 0 on top, values as stored (a DICOM file's own rescale is applied; a TIFF file
+/// whose zero is white is turned round). FileError when it cannot be parsed or is truncated;
+/// InputError when it is not 2-D, has several channels or pixels that are not finite.
 Image2d read_image(const std::filesystem::path& path);
 
 /// An image with what its file says of its pixels.
@@ -25,6 +26,7 @@ struct ImageWithSpacing {
   Image2d image;
   /// Column, row; none for PNG, TIFF and DICOM, and for files that do not state it.
   std::optional<Eigen::Vector2d> spacing_mm;
+  std::string note;  ///< what was done to the stored values; mostly nothing
 };
 
 /// read_image() with the pixel spacing.

@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "image_files/image_header.h"
+#include "image_files/itk_image_io.h"
 
 namespace af::image_formats {
 
@@ -16,8 +17,17 @@ ImageHeader read_meta_header(const std::filesystem::path& path);
 ImageHeader read_nrrd_header(const std::filesystem::path& path);
 ImageHeader read_nifti_header(const std::filesystem::path& path);
 
-/// Walks the chunks of a PNG file with their checksums up to its end mark.
-void check_png(const std::filesystem::path& path);
+/// The origin at 0 and axes along the coordinates, where nothing is stated.
+void set_default_place(ImageHeader& header);
+
+/// By ITK, after its chunks and their checksums were walked: libpng ends the process on a damaged
+/// header. Values are those stored, whatever sBIT and tRNS say of them.
+RawImage read_png(const std::filesystem::path& path, const AcceptImage& accept);
+
+/// By libtiff: grey pages of integers or floats, upright as the orientation tag says, WhiteIsZero
+/// turned round. Several pages are a stack; thumbnails and masks are left out. InputError for
+/// colour, palettes, alpha and for number types that are not read.
+RawImage read_tiff(const std::filesystem::path& path, const AcceptImage& accept);
 
 /// Bytes of the voxels that a header promises; FileError when the product overflows or is absurd.
 std::uint64_t checked_payload_bytes(const std::filesystem::path& path, const ImageHeader& header);

@@ -39,6 +39,13 @@ std::uint64_t existing_file_size(const fs::path& header_path, const fs::path& da
   return bytes;
 }
 
+void set_default_place(ImageHeader& header) {
+  const std::size_t axes = header.size.size();
+  header.origin_mm.assign(axes, 0.0);
+  header.directions.assign(axes, std::vector<double>(axes, 0.0));
+  for (std::size_t axis = 0; axis < axes; ++axis) header.directions[axis][axis] = 1.0;
+}
+
 }  // namespace image_formats
 
 namespace {
@@ -84,11 +91,13 @@ std::string_view format_name(ImageFormat format) {
 std::optional<ImageFormat> sniff_image_format(const fs::path& path) {
   const std::string start = read_prefix(path, 1024);
   const std::string_view bytes(start);
+  // First: its preamble may be the beginning of a TIFF file (PS3.10, 7.1).
+  if (bytes.size() >= 132 && bytes.substr(128, 4) == "DICM") return ImageFormat::Dicom;
   if (bytes.starts_with("NRRD00")) return ImageFormat::Nrrd;
   if (bytes.starts_with("\x89PNG\r\n\x1a\n")) return ImageFormat::Png;
   using namespace std::string_view_literals;
-  if (bytes.starts_with("II*\0"sv) || bytes.starts_with("MM\0*"sv)) return ImageFormat::Tiff;
-  if (bytes.size() >= 132 && bytes.substr(128, 4) == "DICM") return ImageFormat::Dicom;
+  for (const std::string_view tiff : {"II*\0"sv, "MM\0*"sv, "II+\0"sv, "MM\0+"sv})
+    if (bytes.starts_with(tiff)) return ImageFormat::Tiff;
   if (looks_like_meta_image(bytes)) return ImageFormat::MetaImage;
   if (looks_like_nifti(bytes)) return ImageFormat::Nifti;
   if (is_gzip(bytes) && looks_like_nifti(read_inflated_prefix(path, kNifti1HeaderBytes)))

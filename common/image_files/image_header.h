@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -27,14 +26,11 @@ std::optional<ImageFormat> sniff_image_format(const std::filesystem::path& path)
 /// picture does)", whatever its name; empty when that is not known.
 std::string foreign_content(const std::filesystem::path& path);
 
-/// Rows of an affine map from voxel index to RAS+ mm.
-using RasAffine = std::array<std::array<double, 4>, 3>;
-
-/// What a NIfTI-1 header says of orientation, where the code is > 0.
-struct NiftiOrientation {
-  std::optional<RasAffine> qform;
-  std::optional<RasAffine> sform;
-};
+/// Of axes from orthonormal, the cosine between two of them or the error of a length: what cosines
+/// of three decimals leave. A grid within it is taken as the nearest orthonormal one.
+inline constexpr double kMaxDirectionError = 1e-3;
+/// Two grids whose corners are nearer than this are one (as CTs are compared).
+inline constexpr double kSamePlaceMm = 1e-3;
 
 /// What can be said of an image file before a library is trusted with it.
 struct ImageHeader {
@@ -53,9 +49,13 @@ struct ImageHeader {
   bool is_rescaled = false;      ///< values are stored * slope + intercept
   double slope = 1.0;
   double intercept = 0.0;
+  int channels = 1;
   bool has_orientation = true;
   bool has_spacing = true;
-  NiftiOrientation nifti;
+  std::vector<double> spacing_mm;               ///< per axis
+  std::vector<double> origin_mm;                ///< LPS, of the first voxel's centre
+  std::vector<std::vector<double>> directions;  ///< LPS, one unit vector per axis
+  std::vector<std::string> warnings;
 };
 
 /// Reads and checks the header of a MetaImage, NRRD or NIfTI-1 file without allocating by what it

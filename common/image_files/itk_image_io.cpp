@@ -2,6 +2,7 @@
 #include "image_files/itk_image_io.h"
 
 #include <array>
+#include <clocale>
 #include <cstdint>
 #include <fstream>
 #include <string_view>
@@ -37,6 +38,23 @@ constexpr std::array<std::pair<ValueType, Component>, 10> kComponents = {
      {ValueType::UInt64, Component::ULONGLONG},
      {ValueType::Float32, Component::FLOAT},
      {ValueType::Float64, Component::DOUBLE}}};
+
+/// Decimal points in this thread, whatever locale the host program has set: NrrdIO prints and reads
+/// numbers as C does.
+class PointLocale {
+ public:
+  PointLocale() : point_(newlocale(LC_ALL_MASK, "C", nullptr)), before_(uselocale(point_)) {}
+  ~PointLocale() {
+    uselocale(before_);
+    freelocale(point_);
+  }
+  PointLocale(const PointLocale&) = delete;
+  PointLocale& operator=(const PointLocale&) = delete;
+
+ private:
+  locale_t point_;
+  locale_t before_;
+};
 
 /// ITK's messages are the program's business, not the terminal's: what matters comes as exceptions.
 class SilentWindow : public itk::OutputWindow {
@@ -189,6 +207,7 @@ void check_is_whole(const RawImage& image, const fs::path& file, ImageFormat for
 }
 
 void write_by_itk(const RawImage& image, const fs::path& file, ImageFormat format) {
+  const PointLocale locale;
   const itk::ImageIOBase::Pointer io = make_image_io(format);
   io->SetFileName(file.string());
   const auto dimensions = static_cast<unsigned>(image.size.size());
@@ -238,18 +257,8 @@ std::size_t value_bytes(ValueType type) {
   }
 }
 
-RawImage read_raw_image_header(const fs::path& path, ImageFormat format) {
-  return with_itk_errors(path, format, [&] {
-    const itk::ImageIOBase::Pointer io = make_image_io(format);
-    io->SetFileName(path.string());
-    io->ReadImageInformation();
-    return header_of(*io, path);
-  });
-}
-
-RawImage read_raw_image(const fs::path& path,
-                        ImageFormat format,
-                        const std::function<void(const RawImage&)>& accept) {
+RawImage read_raw_image(const fs::path& path, ImageFormat format, const AcceptImage& accept) {
+  const PointLocale locale;
   return with_itk_errors(path, format, [&] {
     const itk::ImageIOBase::Pointer io = make_image_io(format);
     io->SetFileName(path.string());

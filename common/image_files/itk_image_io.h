@@ -24,6 +24,7 @@ struct RawImage {
   int channels = 1;
   ValueType type = ValueType::Int16;
   std::vector<std::byte> values;
+  std::string note;  ///< what was done to the values; mostly nothing
 
   [[nodiscard]] std::size_t voxel_count() const;
 };
@@ -69,14 +70,14 @@ decltype(auto) visit_values(const RawImage& image, Function&& function) {
   return visit_values(image.type, image.values, std::forward<Function>(function));
 }
 
-/// What read_raw_image() reads, without values.
-RawImage read_raw_image_header(const std::filesystem::path& path, ImageFormat format);
+/// Throws when the reader does not want the image; sees it without values.
+using AcceptImage = std::function<void(const RawImage&)>;
 
-/// Reads an image file (not DICOM) by ITK. `accept` sees it without values and throws to refuse it,
-/// before anything is allocated by the header's sizes. FileError when ITK fails.
+/// Reads an image file (not DICOM) by ITK. `accept` sees it before anything is allocated by the
+/// header's sizes. FileError when ITK fails.
 RawImage read_raw_image(const std::filesystem::path& path,
                         ImageFormat format,
-                        const std::function<void(const RawImage&)>& accept);
+                        const AcceptImage& accept);
 
 /// Writes an image by ITK; the format follows the extension: .mha .nii .nii.gz .nrrd .tif .tiff
 /// .png. Appears under its name only when complete. UsageError for another extension.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <bit>
 #include <cmath>
+#include <initializer_list>
 #include <map>
 #include <optional>
 #include <sstream>
@@ -73,28 +74,52 @@ bool is_true(const TextHeader& header, const std::string& key, bool fallback) {
   return (*value)[0] == 'T' || (*value)[0] == 't' || (*value)[0] == '1';
 }
 
-void check_meta_numbers(const TextHeader& header, const std::string& key, std::int64_t expected) {
-  const std::string* text = header.find(key);
-  if (text == nullptr) return;
-  std::int64_t count = 0;
-  std::istringstream words(*text);
-  for (std::string word; words >> word; ++count) {
-    const std::optional<double> value = parsed_number(word);
-    if (!value) throw FileError(header.path, key, "numbers", "'" + *text + "'");
-    if (!std::isfinite(*value))
-      throw InputError(key, "'" + *text + "'", "must be finite", header.path);
+/// The numbers of the first of some keys that the header has; none when it has none of them.
+/// FileError when they are not `expected` numbers, or another of the keys has others.
+std::vector<double> meta_numbers(const TextHeader& header,
+                                 std::initializer_list<const char*> keys,
+                                 std::size_t expected) {
+  std::vector<double> found;
+  for (const std::string key : keys) {
+    const std::string* text = header.find(key);
+    if (text == nullptr) continue;
+    std::vector<double> numbers;
+    std::istringstream words(*text);
+    for (std::string word; words >> word;) {
+      const std::optional<double> value = parsed_number(word);
+      if (!value) throw FileError(header.path, key, "numbers", "'" + *text + "'");
+      if (!std::isfinite(*value))
+        throw InputError(key, "'" + *text + "'", "must be finite", header.path);
+      numbers.push_back(*value);
+    }
+    if (numbers.size() != expected)
+      throw FileError(header.path, key, std::to_string(expected) + " numbers", "'" + *text + "'");
+    if (found.empty())
+      found = numbers;
+    else if (found != numbers)
+      throw FileError(header.path, key + " contradicts another key of the same meaning");
   }
-  if (count != expected)
-    throw FileError(header.path, key, std::to_string(expected) + " numbers", "'" + *text + "'");
+  return found;
 }
 
-/// MetaIO prints to the terminal when numbers are missing or are none.
-void check_meta_numbers(const TextHeader& header, std::int64_t dimension) {
-  for (const char* key : {"TransformMatrix", "Rotation", "Orientation"})
-    check_meta_numbers(header, key, dimension * dimension);
-  for (const char* key :
-       {"ElementSpacing", "ElementSize", "Offset", "Position", "Origin", "CenterOfRotation"})
-    check_meta_numbers(header, key, dimension);
+/// Where the image lies. MetaIO stores one axis direction after the other.
+void read_meta_place(const TextHeader& text, ImageHeader& header) {
+  const std::size_t axes = header.size.size();
+  set_default_place(header);
+  if (const auto origin = meta_numbers(text, {"Offset", "Position", "Origin"}, axes);
+      !origin.empty())
+    header.origin_mm = origin;
+  const auto matrix =
+      meta_numbers(text, {"TransformMatrix", "Rotation", "Orientation"}, axes * axes);
+  header.has_orientation = !matrix.empty();
+  for (std::size_t i = 0; i < matrix.size(); ++i) header.directions[i / axes][i % axes] = matrix[i];
+  header.spacing_mm = meta_numbers(text, {"ElementSpacing"}, axes);
+  if (header.spacing_mm.empty()) header.spacing_mm = meta_numbers(text, {"ElementSize"}, axes);
+  header.has_spacing = !header.spacing_mm.empty();
+  header.spacing_mm.resize(axes, 1.0);
+  const std::string* const unit = text.find("DistanceUnits");
+  if (unit != nullptr && lower(*unit) != "mm")
+    throw InputError("DistanceUnits", "'" + *unit + "'", "lengths must be in mm", text.path);
 }
 
 /// Whether the voxels are in the other byte order than this machine's.
@@ -146,20 +171,17 @@ ImageHeader read_meta_header(const fs::path& path) {
   header.format = ImageFormat::MetaImage;
   const std::int64_t dimension = checked_dimension(text, "NDims");
   header.size = parse_sizes(text.path, text.require("DimSize"), dimension);
-  check_meta_numbers(text, dimension);
+  read_meta_place(text, header);
   const std::int64_t channels = text.integer("ElementNumberOfChannels", 1);
   if (channels < 1 || channels > 1024)
     throw FileError(text.path, "ElementNumberOfChannels", "1 to 1024", std::to_string(channels));
   header.value_type = meta_value_type(text);
+  header.channels = static_cast<int>(channels);
   header.value_bytes = value_bytes(header.value_type) * static_cast<std::uint64_t>(channels);
   header.is_byte_swapped = is_meta_byte_swapped(text);
-  header.has_spacing =
-      text.find("ElementSpacing") != nullptr || text.find("ElementSize") != nullptr;
   if (!is_true(text, "BinaryData", true))
     throw FileError(text.path, "BinaryData = False: text voxels are not supported");
   header.compressed = is_true(text, "CompressedData", false);
-  header.has_orientation = text.find("TransformMatrix") != nullptr ||
-                           text.find("Rotation") != nullptr || text.find("Orientation") != nullptr;
   const std::string& data_file = text.require("ElementDataFile");
   const std::string kind = lower(data_file);
   if (kind.starts_with("list") || data_file.find('%') != std::string::npos)

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <map>
@@ -110,33 +111,126 @@ bool is_nrrd_byte_swapped(const TextHeader& header, ValueType type) {
   return (endian == "big") != (std::endian::native == std::endian::big);
 }
 
-/// Length of the vector "(x,y,z"; NaN when it is none.
-double nrrd_vector_length(const std::string& text) {
-  if (!text.starts_with('(')) return std::nan("");
-  double length = 0.0;
-  std::istringstream numbers(text.substr(1));
+/// The vector "(x,y,z)"; none for anything else.
+std::optional<std::vector<double>> nrrd_vector(std::string_view text) {
+  if (!text.starts_with('(') || !text.ends_with(')')) return std::nullopt;
+  std::vector<double> vector;
+  std::istringstream numbers(std::string(text.substr(1, text.size() - 2)));
   for (std::string number; std::getline(numbers, number, ',');) {
-    const std::optional<double> value = parsed_number(trimmed(number));
-    if (!value) return std::nan("");
-    length = std::hypot(length, *value);
+    const std::optional<double> value = finite_number(trimmed(number));
+    if (!value) return std::nullopt;
+    vector.push_back(*value);
   }
+  return vector;
+}
+
+double length_of(const std::vector<double>& vector) {
+  double length = 0.0;
+  for (const double value : vector) length = std::hypot(length, value);
   return length;
 }
 
-/// ITK takes a spacing of 1 for axes whose vector is "none" or too long for its sum of squares.
-void check_nrrd_directions(const TextHeader& header, std::int64_t dimension) {
+/// The "space directions" of an image of at most three axes: one vector per axis.
+std::vector<std::vector<double>> nrrd_directions(const TextHeader& header, std::size_t axes) {
   const std::string* text = header.find("space directions");
-  if (text == nullptr || dimension > 3) return;
-  std::int64_t count = 0;
+  if (text == nullptr || axes > 3) return {};
+  std::vector<std::vector<double>> directions;
   std::istringstream vectors(*text);
   bool plausible = true;
-  for (std::string vector; std::getline(vectors, vector, ')'); ++count)
-    plausible = plausible && is_plausible_spacing_mm(nrrd_vector_length(trimmed(vector)));
-  if (!plausible || count != dimension)
+  for (std::string vector; std::getline(vectors, vector, ')');) {
+    const auto found = nrrd_vector(trimmed(vector) + ")");
+    plausible = plausible && found && is_plausible_spacing_mm(length_of(*found));
+    directions.push_back(found.value_or(std::vector<double>()));
+  }
+  if (!plausible || directions.size() != axes)
     throw InputError("space directions",
                      "'" + *text + "'",
                      std::string("each axis needs a vector, whose length ") + kPlausibleSpacing,
                      header.path);
+  return directions;
+}
+
+/// What turns coordinates of "left-anterior-superior" (or "LAS") and its like into LPS; none for
+/// spaces that are not the patient's, such as "scanner-xyz".
+std::optional<std::array<double, 3>> lps_signs(const std::string& space) {
+  std::string letters = space;
+  if (space.find('-') != std::string::npos) {
+    letters.clear();
+    std::istringstream words(space);
+    for (std::string word; std::getline(words, word, '-');) letters += word.substr(0, 1);
+  }
+  constexpr std::array<std::string_view, 3> kWays = {"lr", "pa", "si"};
+  if (letters.size() != kWays.size()) return std::nullopt;
+  std::array<double, 3> signs{};
+  for (std::size_t axis = 0; axis < kWays.size(); ++axis) {
+    const std::size_t way = kWays[axis].find(letters[axis]);
+    if (way == std::string_view::npos) return std::nullopt;
+    signs[axis] = way == 0 ? 1.0 : -1.0;
+  }
+  return signs;
+}
+
+/// "spacings"; none where an axis has none ("nan").
+std::vector<double> nrrd_spacings(const TextHeader& header, std::size_t axes) {
+  const std::string* text = header.find("spacings");
+  if (text == nullptr) return {};
+  std::vector<double> spacings;
+  std::istringstream words(*text);
+  for (std::string word; words >> word;) {
+    const std::optional<double> value = parsed_number(word);
+    if (!value) throw FileError(header.path, "spacings", "numbers", "'" + *text + "'");
+    if (std::isnan(*value)) return {};
+    spacings.push_back(*value);
+  }
+  if (spacings.size() != axes)
+    throw FileError(header.path, "spacings", std::to_string(axes) + " numbers", "'" + *text + "'");
+  return spacings;
+}
+
+/// Where the image lies.
+void read_nrrd_place(const TextHeader& text, ImageHeader& header) {
+  const std::size_t axes = header.size.size();
+  set_default_place(header);
+  const std::vector<std::vector<double>> directions = nrrd_directions(text, axes);
+  header.spacing_mm = nrrd_spacings(text, axes);
+  if (!directions.empty()) header.spacing_mm.clear();
+  for (const auto& vector : directions) header.spacing_mm.push_back(length_of(vector));
+  header.has_spacing = !header.spacing_mm.empty();
+  header.spacing_mm.resize(axes, 1.0);
+  const std::string* const name = text.find("space");
+  const std::string space = name == nullptr ? "" : lower(*name);
+  if (space.starts_with("3d-left-handed"))
+    throw InputError("space", *name, "must be right-handed, or left would become right", text.path);
+  const auto signs = lps_signs(space);
+  header.has_orientation = signs.has_value() && !directions.empty();
+  const std::string* const place = text.find("space origin");
+  const auto origin = place == nullptr ? std::vector<double>(3) : nrrd_vector(*place);
+  if (!origin)
+    throw InputError("space origin", "'" + *place + "'", "must be a vector of numbers", text.path);
+  const bool is_in_space = axes == 3 && directions.size() == 3 && origin->size() == 3 &&
+                           std::all_of(directions.begin(), directions.end(), [](const auto& v) {
+                             return v.size() == 3;
+                           });
+  if (!is_in_space) return;
+  for (std::size_t row = 0; row < 3; ++row) {
+    const double sign = signs ? (*signs)[row] : 1.0;
+    header.origin_mm[row] = sign * (*origin)[row];
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      header.directions[axis][row] = sign * directions[axis][row] / header.spacing_mm[axis];
+  }
+}
+
+/// Axes of colours, vectors and the like hold no voxels of their own.
+void check_nrrd_kinds(const TextHeader& header) {
+  const std::string* text = header.find("kinds");
+  if (text == nullptr) return;
+  constexpr std::array<std::string_view, 8> kOfVoxels = {
+      "domain", "space", "time", "list", "stub", "scalar", "none", "???"};
+  std::istringstream words(*text);
+  for (std::string word; words >> word;)
+    if (std::find(kOfVoxels.begin(), kOfVoxels.end(), lower(word)) == kOfVoxels.end())
+      throw InputError(
+          "kinds", *text, "one value per voxel is read: \"domain\" for every axis", header.path);
 }
 
 void check_nrrd_units(const TextHeader& header) {
@@ -146,14 +240,6 @@ void check_nrrd_units(const TextHeader& header) {
   for (std::string word; words >> word;)
     if (word != "\"mm\"" && word != "\"\"")
       throw InputError("space units", *text, "lengths must be in \"mm\"", header.path);
-}
-
-/// Whether ITK knows how the axes lie in the patient.
-bool has_patient_space(const TextHeader& header) {
-  const std::string* text = header.find("space");
-  const std::string space = text == nullptr ? "" : lower(*text);
-  return space.starts_with("left-") || space.starts_with("right-") || space == "lps" ||
-         space == "ras" || space == "las";
 }
 
 }  // namespace
@@ -166,11 +252,9 @@ ImageHeader read_nrrd_header(const fs::path& path) {
   header.size = parse_sizes(text.path, text.require("sizes"), dimension);
   header.value_type = nrrd_value_type(text);
   header.value_bytes = value_bytes(header.value_type);
-  check_nrrd_directions(text, dimension);
+  read_nrrd_place(text, header);
   check_nrrd_units(text);
-  const bool has_directions = text.find("space directions") != nullptr;
-  header.has_spacing = has_directions || text.find("spacings") != nullptr;
-  header.has_orientation = has_directions && has_patient_space(text);
+  check_nrrd_kinds(text);
   const std::string encoding = lower(text.require("encoding"));
   header.compressed = encoding == "gzip" || encoding == "gz";
   if (!header.compressed && encoding != "raw")

@@ -71,29 +71,6 @@ void check_compressed_bytes(const fs::path& path,
                         " bytes behind the compressed voxels are ignored");
 }
 
-bool is_described_by_us(const ImageHeader& header) {
-  return !header.size.empty();
-}
-
-/// Both parsers must have understood the same file: one may take the first of two equal keys, the
-/// other the last.
-void check_is_as_described(const fs::path& path, const ImageHeader& header, const RawImage& image) {
-  std::uint64_t promised = 1;
-  for (const std::uint64_t extent : header.size) promised *= extent;
-  if (image.voxel_count() != promised)
-    throw FileError(path.string(),
-                    "voxels",
-                    std::to_string(promised) + " by its header",
-                    std::to_string(image.voxel_count()) + " by ITK's reading of it");
-  const std::uint64_t bytes =
-      static_cast<std::uint64_t>(image.channels) * value_bytes(header.value_type);
-  if (header.value_bytes != bytes)
-    throw FileError(path.string(),
-                    "bytes of a voxel",
-                    std::to_string(header.value_bytes) + " by its header",
-                    std::to_string(bytes) + " by ITK's reading of it");
-}
-
 void reverse_each(std::vector<std::byte>& bytes, std::size_t value_bytes) {
   for (auto at = bytes.begin(); at != bytes.end();) {
     const auto end = at + static_cast<std::ptrdiff_t>(value_bytes);
@@ -118,18 +95,10 @@ std::vector<std::byte> rescaled_to(const ImageHeader& header, std::span<const st
 
 }  // namespace
 
-void check_image_payload(const fs::path& path,
-                         const ImageHeader& header,
-                         std::vector<std::string>* warnings) {
-  read_image_payload(path, header, warnings, nullptr);
-}
-
 void read_image_payload(const fs::path& path,
                         const ImageHeader& header,
                         std::vector<std::string>* warnings,
                         const ByteVisitor& visit) {
-  if (header.format == ImageFormat::Png) check_png(path);
-  if (header.size.empty()) return;
   const std::uint64_t payload = checked_payload_bytes(path, header);
   const std::uint64_t expected = payload + header.skip_bytes;
   const std::uint64_t file_bytes = existing_file_size(path, header.data_file);
@@ -140,15 +109,13 @@ void read_image_payload(const fs::path& path,
                     "truncated: " + std::to_string(stored) + " compressed bytes cannot hold the " +
                         std::to_string(expected) + " bytes that the header promises");
   PayloadPieces pieces(header.skip_bytes, payload, visit);
-  const ByteVisitor take = [&](std::span<const std::byte> bytes) {
-    if (visit) pieces.add(bytes);
-  };
+  const ByteVisitor take = [&](std::span<const std::byte> bytes) { pieces.add(bytes); };
   std::uint64_t found = stored;
   if (header.compressed) {
     const InflatedBytes bytes = inflate_file(header.data_file, header.payload_offset, take);
     check_compressed_bytes(path, header, bytes.compressed, stored, warnings);
     found = bytes.inflated;
-  } else if (visit && stored >= expected) {
+  } else if (stored >= expected) {
     found = read_plain_file(header.data_file, header.payload_offset, take);
   }
   if (found < expected)
@@ -161,19 +128,13 @@ void read_image_payload(const fs::path& path,
                         " bytes more than the header says; they are ignored");
 }
 
-RawImage read_image_description(const fs::path& path,
-                                const ImageHeader& header,
-                                const AcceptImage& accept) {
+RawImage image_description(const ImageHeader& header) {
   RawImage image;
-  try {
-    image = read_raw_image_header(path, header.format);
-  } catch (const FileError&) {
-    check_image_payload(path, header, nullptr);  // says more of a damaged stream than ITK does
-    throw;
-  }
-  accept(image);
-  if (!is_described_by_us(header)) return image;
-  check_is_as_described(path, header, image);
+  image.size.assign(header.size.begin(), header.size.end());
+  image.spacing_mm = header.spacing_mm;
+  image.origin_mm = header.origin_mm;
+  image.directions = header.directions;
+  image.channels = header.channels;
   image.type = header.value_type;
   if (header.is_rescaled)
     image.type = header.value_type == ValueType::Float64 ? ValueType::Float64 : ValueType::Float32;
@@ -206,11 +167,10 @@ RawImage read_stored_image(const fs::path& path,
                            const ImageHeader& header,
                            std::vector<std::string>* warnings,
                            const AcceptImage& accept) {
-  if (!is_described_by_us(header)) {
-    check_image_payload(path, header, warnings);
-    return read_raw_image(path, header.format, accept);
-  }
-  RawImage image = read_image_description(path, header, accept);
+  if (header.format == ImageFormat::Tiff) return read_tiff(path, accept);
+  if (header.format == ImageFormat::Png) return read_png(path, accept);
+  RawImage image = image_description(header);
+  accept(image);
   read_described_values(path, header, image, warnings, [&](std::span<const std::byte> piece) {
     if (image.values.empty())
       image.values.reserve(image.voxel_count() * static_cast<std::size_t>(image.channels) *

@@ -13,41 +13,30 @@
 
 namespace af {
 
-/// Checks that all voxels which the header promises are there: by file size, or by decompressing to
-/// the end (which also verifies the stream's own checksum). The libraries behind ITK fill missing
-/// voxels with zeros, and that of PNG aborts the process on a damaged header, which is walked
-/// here first. FileError names expected and found bytes; surplus bytes are a warning.
-void check_image_payload(const std::filesystem::path& path,
-                         const ImageHeader& header,
-                         std::vector<std::string>* warnings);
-
-/// The same, and hands the bytes of the voxels to `visit` on the way, in order, in pieces of 1 MiB
-/// (the last may be shorter). What `visit` has seen counts for nothing when this throws.
+/// Hands the bytes of the voxels of a MetaImage, NRRD or NIfTI to `visit`, in order, in pieces of
+/// 1 MiB (the last may be shorter), and checks that all are there which the header promises: by
+/// file size, or by decompressing to the end (which also verifies the stream's own checksum).
+/// FileError names expected and found bytes; surplus bytes are a warning. What `visit` has seen
+/// counts for nothing when this throws.
 void read_image_payload(const std::filesystem::path& path,
                         const ImageHeader& header,
                         std::vector<std::string>* warnings,
                         const ByteVisitor& visit);
 
-/// Throws when the reader does not want the image; sees it without values.
-using AcceptImage = std::function<void(const RawImage&)>;
-
-/// An image (not DICOM) without values. FileError when it is damaged or its header reads
-/// differently to us and to ITK.
-RawImage read_image_description(const std::filesystem::path& path,
-                                const ImageHeader& header,
-                                const AcceptImage& accept);
+/// A MetaImage, NRRD or NIfTI without values.
+RawImage image_description(const ImageHeader& header);
 
 /// The values of a described MetaImage, NRRD or NIfTI, in order and in the description's type, in
-/// pieces of whole values; byte order and NIfTI's slope and intercept are applied. ITK does not
-/// read them, because its libraries return zeros for missing voxels and for NaN.
+/// pieces of whole values; byte order and NIfTI's slope and intercept are applied. ITK reads
+/// neither these files' values nor their headers: its libraries return zeros for missing voxels and
+/// for NaN, take `LAS` for another space, and numbers by the locale of the host program.
 void read_described_values(const std::filesystem::path& path,
                            const ImageHeader& header,
                            const RawImage& description,
                            std::vector<std::string>* warnings,
                            const ByteVisitor& visit);
 
-/// An image (not DICOM) with its values; those of PNG and TIFF are read by ITK after
-/// check_image_payload().
+/// An image (not DICOM) with its values.
 RawImage read_stored_image(const std::filesystem::path& path,
                            const ImageHeader& header,
                            std::vector<std::string>* warnings,

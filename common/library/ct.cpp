@@ -34,8 +34,7 @@ Ct Ct::from_voxels(const CtGrid& grid,
                    std::span<const std::int16_t> hu) {
   return library::translated([&] {
     auto impl = std::make_shared<Impl>();
-    impl->ct.grid = library::grid_of(grid);
-    af::require_sound_grid(impl->ct.grid, "CT");
+    impl->ct.grid = af::sound_grid(library::grid_of(grid), "CT", &impl->warnings);
     if (impl->ct.grid.voxel_count() != hu.size())
       throw af::InputError("CT: voxels",
                            std::to_string(hu.size()),

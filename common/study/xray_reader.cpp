@@ -31,8 +31,10 @@ constexpr double kMostDeadPixels = 0.25;
 
 struct LoadedImage {
   Image2d image;
-  std::optional<Eigen::Vector2d> spacing_mm;
-  std::optional<DicomXray> dicom;  ///< without its image
+  std::optional<Eigen::Vector2d> spacing_mm;  ///< of other formats than DICOM
+  std::optional<DicomXray> dicom;             ///< without its image and data
+  Image2d data;                               ///< 0 where a pixel is padding; empty: none is
+  std::string note;                           ///< of reading other formats
 };
 
 LoadedImage load(const std::filesystem::path& path, std::optional<int> frame) {
@@ -40,7 +42,7 @@ LoadedImage load(const std::filesystem::path& path, std::optional<int> frame) {
   if (sniff_image_format(path) == ImageFormat::Dicom) {
     loaded.dicom = read_dicom_xray(path, frame);
     loaded.image = std::move(loaded.dicom->image);
-    loaded.spacing_mm = loaded.dicom->imager_spacing_mm;
+    loaded.data = std::move(loaded.dicom->data);
     return loaded;
   }
   ImageWithSpacing read = read_image_with_spacing(path);
@@ -49,7 +51,7 @@ LoadedImage load(const std::filesystem::path& path, std::optional<int> frame) {
                      std::to_string(*frame),
                      "is for DICOM files of several frames",
                      path.string());
-  return {std::move(read.image), read.spacing_mm, std::nullopt};
+  return {std::move(read.image), read.spacing_mm, std::nullopt, Image2d(), read.note};
 }
 
 void check_size(const Image2d& image, const std::string& file, const CameraGeometry& camera) {
@@ -78,24 +80,33 @@ void check_spacing(const LoadedImage& loaded,
                    const CameraGeometry& camera,
                    std::vector<std::string>& warnings) {
   if (view.reading.ignores_spacing) return;
-  if (loaded.spacing_mm) {
-    if ((!loaded.dicom && *loaded.spacing_mm == Eigen::Vector2d::Ones()) ||
-        is_spacing_of(camera, *loaded.spacing_mm))
+  const auto spacing_mm = loaded.dicom
+                              ? imager_spacing_mm(loaded.dicom->header, loaded.dicom->frame)
+                              : loaded.spacing_mm;
+  if (spacing_mm) {
+    if ((!loaded.dicom && *spacing_mm == Eigen::Vector2d::Ones()) ||
+        is_spacing_of(camera, *spacing_mm))
       return;
     throw InputError(loaded.dicom ? "ImagerPixelSpacing" : "pixel spacing",
-                     spacing_text(*loaded.spacing_mm),
+                     spacing_text(*spacing_mm),
                      "must equal pixel_spacing_mm of camera '" + camera.name +
                          "': " + spacing_text(camera.pixel_spacing_mm) +
                          " (column, row); correct the rig or the file, or set xray_spacing = "
                          "\"ignore\"",
                      view.xray.string());
   }
-  if (loaded.dicom && loaded.dicom->pixel_spacing_mm &&
-      !is_spacing_of(camera, *loaded.dicom->pixel_spacing_mm))
-    warnings.push_back(
-        view.xray.string() + ": PixelSpacing = " + spacing_text(*loaded.dicom->pixel_spacing_mm) +
-        ", but camera '" + camera.name + "' has " + spacing_text(camera.pixel_spacing_mm) +
-        " (no ImagerPixelSpacing: it may be that of a plane in the patient)");
+  if (!loaded.dicom) return;
+  std::optional<Eigen::Vector2d> in_patient_mm;
+  try {
+    in_patient_mm = xray_pixel_spacing_mm(*loaded.dicom);
+  } catch (const InputError& error) {  // it would only be warned of
+    warnings.push_back(std::string(error.what()) + "; not checked");
+  }
+  if (in_patient_mm && !is_spacing_of(camera, *in_patient_mm))
+    warnings.push_back(view.xray.string() + ": PixelSpacing = " + spacing_text(*in_patient_mm) +
+                       ", but camera '" + camera.name + "' has " +
+                       spacing_text(camera.pixel_spacing_mm) +
+                       " (no ImagerPixelSpacing: it may be that of a plane in the patient)");
 }
 
 /// What is known of a file's values besides them, in the order in which it is done.
@@ -203,14 +214,26 @@ void check_values(const Image2d& image, const StudyView& view) {
         "pixels", "all " + std::to_string(*low), "a constant image shows nothing", file);
 }
 
+/// Takes out of a mask what another one hides; empty ones hide nothing.
+void hide(Image2d& mask, const Image2d& shown) {
+  if (mask.pixels.empty()) {
+    mask = shown;
+    return;
+  }
+  for (std::size_t i = 0; i < shown.pixels.size(); ++i)
+    if (shown.pixels[i] == 0.0f) mask.pixels[i] = 0.0f;
+}
+
 /// The flat or dark image of a view, turned as its X-ray: by the same full scale, which a flat
-/// field of inverted values, all small, does not show.
+/// field of inverted values, all small, does not show. `mask` loses its padding.
 Image2d load_companion(const std::filesystem::path& path,
                        const StudyView& view,
                        const CameraGeometry& camera,
-                       std::optional<double> sum_of_xray) {
+                       std::optional<double> sum_of_xray,
+                       Image2d& mask) {
   LoadedImage loaded = load(path, std::nullopt);
   check_size(loaded.image, path.string(), camera);
+  hide(mask, loaded.data);
   if (!is_turned(loaded, view)) return std::move(loaded.image);
   const double sum =
       loaded.dicom ? loaded.dicom->inversion_sum : sum_of_xray.value_or(inversion_sum(loaded));
@@ -244,7 +267,7 @@ void correct_by_flat(const StudyView& view,
   Image2d dark;
   if (reading.dark) {
     dark = naming_study_line(view.places, "dark", [&] {
-      return load_companion(*reading.dark, view, camera, sum_of_xray);
+      return load_companion(*reading.dark, view, camera, sum_of_xray, mask);
     });
     note.add("dark image subtracted");
   } else if (reading.dark_level != 0.0) {
@@ -257,7 +280,7 @@ void correct_by_flat(const StudyView& view,
     return;
   }
   const Image2d flat = naming_study_line(view.places, "flat", [&] {
-    return load_companion(*reading.flat, view, camera, sum_of_xray);
+    return load_companion(*reading.flat, view, camera, sum_of_xray, mask);
   });
   std::size_t dead = 0;
   for (std::size_t i = 0; i < flat.pixels.size(); ++i)
@@ -306,6 +329,7 @@ double percentile_level(const Image2d& image, const Image2d& mask, const StudyVi
 
 double air_level(const Image2d& image,
                  const XrayBorders& borders,
+                 const Image2d& field,
                  const StudyView& view,
                  Note& note) {
   const auto told = [&](double level, const std::string& how) {
@@ -313,7 +337,6 @@ double air_level(const Image2d& image,
     return level;
   };
   if (view.reading.flat) return 1.0;
-  const Image2d field = view.reading.masks_borders ? borders.mask : Image2d();
   switch (view.reading.air) {
     case AirSource::Value:
       return told(view.reading.air_level, "stated");
@@ -371,27 +394,27 @@ XrayBorders borders_of(const Image2d& image, XrayDomain domain) {
 }
 
 /// Looking for borders takes a while on large pictures.
-bool needs_borders(const StudyView& view, const Image2d& image) {
+bool needs_borders(const StudyView& view, const Image2d& image, const Image2d& data) {
   const Background unexpected =
       view.xray_domain == XrayDomain::Intensity ? Background::Dark : Background::Bright;
   return view.reading.masks_borders || view.reading.air == AirSource::CollimatedBorders ||
-         background_of(image, Image2d()) == unexpected;
+         background_of(image, data) == unexpected;
 }
 
 void note_background(const Image2d& image,
                      const StudyView& view,
                      const XrayBorders& borders,
+                     const Image2d& field,
                      Note& note,
                      std::vector<std::string>& warnings) {
-  const Image2d mask = view.reading.masks_borders ? borders.mask : Image2d();
-  const Background found = background_of(image, mask);
+  const Background found = background_of(image, field);
   if (found == Background::Undecided) return;
   const bool is_bright = found == Background::Bright;
   const bool is_intensity = view.xray_domain == XrayDomain::Intensity;
   const bool is_expected = is_bright == is_intensity;
   const bool is_plainly_shut = borders.circle.has_value() || borders.straight_sides > 2;
   const bool is_intensity_by_detail =
-      is_intensity && !is_expected && bright_detail(image, mask) > 0.0;
+      is_intensity && !is_expected && bright_detail(image, field) > 0.0;
   note.add(std::string("background looks ") + (is_bright ? "bright" : "dark") +
            (is_intensity_by_detail ? ", detail grows with brightness: no negative" : "") +
            (is_intensity_by_detail && is_plainly_shut && !view.reading.masks_borders
@@ -417,11 +440,7 @@ double hidden_share(const Image2d& mask, const RegionOfInterest& roi) {
 /// What an automatic mask hides, checked against the region of interest.
 void use_borders(const XrayBorders& borders, const StudyView& view, Image2d& mask, Note& note) {
   note.add(borders.text());
-  if (borders.is_any()) {
-    if (mask.pixels.empty()) mask = Image2d(borders.mask);
-    for (std::size_t i = 0; i < mask.pixels.size(); ++i)
-      if (borders.mask.pixels[i] == 0.0f) mask.pixels[i] = 0.0f;
-  }
+  if (borders.is_any()) hide(mask, borders.mask);
   if (mask.pixels.empty() || view.roi.pixel_count() == 0) return;
   const double hidden = hidden_share(mask, view.roi);
   if (hidden > kMostHidden)
@@ -457,16 +476,42 @@ Image2d read_mask_file(const StudyView& view, const CameraGeometry& camera) {
   return mask;
 }
 
+/// Padding gets the value of a border, so that what looks for borders finds none of another kind:
+/// the darkest of an intensity, the densest of an attenuation.
+void darken_padding(XrayDomain domain, LoadedImage& loaded) {
+  const std::vector<float> values = values_in(loaded.image, loaded.data);
+  const auto [low, high] = std::minmax_element(values.begin(), values.end());
+  const float border = domain == XrayDomain::Intensity ? *low : *high;
+  for (std::size_t i = 0; i < loaded.data.pixels.size(); ++i)
+    if (loaded.data.pixels[i] == 0.0f) loaded.image.pixels[i] = border;
+}
+
+void check_padding(const LoadedImage& loaded, const StudyView& view, Note& note) {
+  const RegionOfInterest whole = {0, 0, loaded.data.width, loaded.data.height};
+  note.add(percent(hidden_share(loaded.data, whole)) + " masked as padding (" +
+           loaded.dicom->padding + ")");
+  if (view.roi.pixel_count() == 0) return;
+  const double hidden = hidden_share(loaded.data, view.roi);
+  if (hidden > kMostHidden)
+    throw InputError(
+        loaded.dicom->padding,
+        "padding",
+        "hides " + percent(hidden) +
+            " of roi_px; if these pixels are data, the file must not call them padding",
+        view.xray.string());
+}
+
 /// The X-ray's values, rising with what `xray_domain` says, and what was done for that;
 /// `inversion` is what they were subtracted from.
-Image2d load_oriented(const StudyView& view,
-                      const CameraGeometry& camera,
-                      std::optional<double>& inversion,
-                      Note& note,
-                      std::vector<std::string>& warnings) {
+LoadedImage load_oriented(const StudyView& view,
+                          const CameraGeometry& camera,
+                          std::optional<double>& inversion,
+                          Note& note,
+                          std::vector<std::string>& warnings) {
   LoadedImage loaded = load(view.xray, view.reading.frame);
   check_size(loaded.image, view.xray.string(), camera);
   check_spacing(loaded, view, camera, warnings);
+  if (!loaded.note.empty()) note.add(loaded.note);
   if (loaded.dicom) {
     note_header(*loaded.dicom, note);
     check_relationship(*loaded.dicom, view, warnings);
@@ -476,7 +521,11 @@ Image2d load_oriented(const StudyView& view,
     turn_round(loaded.image, *inversion);
     note.add("values inverted: " + number_text(*inversion) + " - stored");
   }
-  return std::move(loaded.image);
+  if (!loaded.data.pixels.empty()) {
+    darken_padding(view.xray_domain, loaded);
+    check_padding(loaded, view, note);
+  }
+  return loaded;
 }
 
 }  // namespace
@@ -493,13 +542,19 @@ ViewXray read_view_xray(const StudyView& view, const CameraGeometry& camera) {
   if (!camera.distortion.is_none()) undistortion.emplace(camera);
   Image2d undistorted;
   std::optional<double> inversion;
+  Image2d field;  // 0: no data, or a border that mask = "auto" hides
   naming_study_line(view.places, "xray", [&] {
-    image = load_oriented(view, camera, inversion, note, xray.warnings);
+    LoadedImage loaded = load_oriented(view, camera, inversion, note, xray.warnings);
+    image = std::move(loaded.image);
     check_values(image, view);
+    hide(xray.mask, loaded.data);
     if (undistortion) undistorted = undistortion->image(image);
     const Image2d& shown = undistortion ? undistorted : image;
-    if (needs_borders(view, shown)) borders = borders_of(shown, view.xray_domain);
-    note_background(shown, view, borders, note, xray.warnings);
+    if (!loaded.data.pixels.empty())
+      field = undistortion ? undistortion->mask(loaded.data) : std::move(loaded.data);
+    if (needs_borders(view, shown, field)) borders = borders_of(shown, view.xray_domain);
+    if (view.reading.masks_borders) hide(field, borders.mask);
+    note_background(shown, view, borders, field, note, xray.warnings);
   });
   // Flat and dark fields are of the detector's own pixels.
   if (view.xray_domain == XrayDomain::Intensity)
@@ -511,7 +566,7 @@ ViewXray read_view_xray(const StudyView& view, const CameraGeometry& camera) {
     });
   naming_study_line(view.places, "xray", [&] {
     if (view.xray_domain == XrayDomain::Intensity)
-      take_negative_log(image, air_level(image, borders, view, note));
+      take_negative_log(image, air_level(image, borders, field, view, note));
     if (view.reading.masks_borders) use_borders(borders, view, xray.mask, note);
   });
   xray.note = note.text();

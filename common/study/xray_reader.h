@@ -21,9 +21,9 @@ struct ViewXray {
 /// by -log(I / I_open); I_open is the 99.9th percentile of the image unless the view says
 /// otherwise. MONOCHROME1, rescale and PixelIntensityRelationship of DICOM are honoured, windows
 /// are not. Images of a camera with distortion are undistorted behind flat and dark fields and
-/// before the logarithm; so are masks. InputError when the size or the pixel spacing is not the
-/// camera's, the image is constant, the air level cannot be found, an automatic mask hides most of
-/// the region, or the values are logarithms and called intensities.
+/// before the logarithm; so are masks. Padding of DICOM is masked. InputError when the size or the
+/// pixel spacing is not the camera's, the image is constant, the air level cannot be found, an
+/// automatic mask hides most of the region, or the values are logarithms and called intensities.
 ViewXray read_view_xray(const StudyView& view, const CameraGeometry& camera);
 
 }  // namespace af

@@ -269,7 +269,9 @@ StudyPictures draw_study_pictures(const Study& study,
                                   const std::string& stem) {
   StudyPictures pictures;
   const CtVolume ct = naming_study_line(study_case.places, "ct", [&] {
-    return read_ct(study_case.ct, ct_reading_in_force(ct_reading, study_case.ct_reading));
+    return read_ct(study_case.ct,
+                   ct_reading_in_force(ct_reading, study_case.ct_reading),
+                   &pictures.ct_warnings);
   });
   const RayCastDrr caster(std::make_shared<const AttenuationVolume>(ct, AttenuationModel()));
   std::vector<ShownPose> poses = {{"nominal pose", study_case.nominal_room_from_ct}};

@@ -20,6 +20,7 @@ struct StudyPictures {
   std::vector<std::string> facts;  ///< "camera A: left edge R, ...", and what its field holds
   /// Mirrored cameras, X-rays that look flipped or scaled, fields that miss rays.
   std::vector<std::string> telltales;
+  std::vector<std::string> ct_warnings;  ///< of reading the CT
 };
 
 /// Draws STEM-CAMERA.png for each view of a case (X-ray and DRRs at the nominal pose and, where the

@@ -321,6 +321,7 @@ void write_image_seeds(const fs::path& folder) {
   write_image_u16(image, folder / "image" / "xray.png", 1.0, 1.0);
   write_image(image, folder / "image" / "xray.mha", 1.0, 1.0);
   write_image(image, folder / "image" / "xray.tif", 1.0, 1.0);
+  write_image(image, folder / "image" / "xray.tif", 1.0, 1.0);
   write_seed(folder / "image" / "detached.mhd",
              "NDims = 2\nDimSize = 4 4\nElementType = MET_UCHAR\nElementSpacing = 1 1\n"
              "HeaderSize = -1\nElementDataFile = image\n");

@@ -57,6 +57,31 @@ void write_bytes(const fs::path& path, const std::string& bytes) {
   std::ofstream(path, std::ios::binary) << bytes;
 }
 
+TEST(WarningsOfACt, AreToldOnceByEveryProgramThatReadsIt) {
+  const ScratchFolder folder;
+  CtGrid grid = test::small_grid();
+  grid.spacing_mm *= 10.0;
+  grid.origin_mm = -grid.center_mm();
+  test::write_dicom_series(
+      test::asymmetric_ct(grid), folder / "ct", [](int slice, test::DicomTestFile& file) {
+        file.set_text({0x0028, 0x1053}, "DS", slice == 2 ? "100" : "1");
+      });
+  const std::string ct = " --ct " + (folder / "ct").string();
+  const std::string camera = ct + " --rig c-arm-12in --camera AP";
+  for (const std::string& command :
+       {program("af-inspect") + " " + (folder / "ct").string(),
+        program("af-drr") + camera + " -o " + (folder / "drr.mha").string(),
+        program("af-precompute") + camera + " --dry-run -o " + (folder / "f.af.h5").string(),
+        program("af-simulate") + ct + " --rig c-arm-12in -o " + (folder / "study").string()}) {
+    const test::ProgramRun run = test::run_command(command);
+    EXPECT_EQ(run.exit_code, 0) << run.output;
+    const std::string warning = "beyond int16 were clamped";
+    const std::size_t first = run.output.find(warning);
+    EXPECT_NE(first, std::string::npos) << command << run.output;
+    EXPECT_EQ(run.output.find(warning, first + 1), std::string::npos) << command << run.output;
+  }
+}
+
 TEST(AfInspect, TellsACtsGeometryValuesAndContentHash) {
   const ScratchFolder folder;
   CtGrid grid = test::small_grid();

@@ -50,6 +50,7 @@ struct DrrScene {
   /// How far the camera is from the field's own, with several fields from the first one's; empty
   /// for that one.
   std::string note;
+  std::vector<std::string> warnings;  ///< of the CT
 };
 
 void describe_source(Fields& field, DrrOptions& options) {
@@ -234,8 +235,9 @@ std::shared_ptr<const DrrRenderer> cast_through(
 CastCt ray_caster(const DrrOptions& options,
                   const DrrSource& source,
                   const std::optional<FieldIdentity>& field,
-                  const std::shared_ptr<ThreadPool>& pool) {
-  const CtVolume ct = read_ct(source.ct, source.ct_reading);
+                  const std::shared_ptr<ThreadPool>& pool,
+                  std::vector<std::string>& warnings) {
+  const CtVolume ct = read_ct(source.ct, source.ct_reading, &warnings);
   AttenuationModel model = options.attenuation;
   if (field.has_value()) {
     require_same_ct(options.field.string(), identity_of(ct), source.ct.string(), field->ct);
@@ -329,7 +331,7 @@ DrrScene load_scene(const DrrOptions& options, const Communicator& communicator)
   else if (!field)
     scene.frame.center_room_mm = source.isocenter_point;
   if (!source.ct.empty()) {
-    const CastCt cast = ray_caster(options, source, field, scene.pool);
+    const CastCt cast = ray_caster(options, source, field, scene.pool, scene.warnings);
     (field ? scene.reference : scene.renderer) = cast.renderer;
     if (!field && !source.frame.has_value()) scene.frame.center_ct_mm = cast.center_ct_mm;
   }
@@ -497,7 +499,7 @@ void run_drr(const DrrOptions& options, const Communicator& world) {
   throw_if_any(problems(options));
   if (world.is_root()) announce_output(options.output);
   const DrrScene scene = load_scene(options, world);
-  std::vector<std::string> notes;
+  std::vector<std::string> notes = scene.warnings;
   const std::vector<RigidTransform> poses = requested_poses(options, scene, notes);
   if (const std::string text = range_note(scene.stated, poses); !text.empty())
     notes.push_back(text);

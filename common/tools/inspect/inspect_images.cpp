@@ -9,6 +9,7 @@
 
 #include "files/sha256.h"
 #include "image_files/ct_reader.h"
+#include "image_files/dicom_xray.h"
 #include "image_files/image_file.h"
 #include "image_files/image_header.h"
 #include "image_files/itk_image_io.h"
@@ -203,11 +204,24 @@ std::size_t used_dimensions(const RawImage& image) {
   return used;
 }
 
-void inspect_picture(const fs::path& path, Inspection& inspection) {
+void inspect_picture(const Image2d& image, Inspection& inspection) {
   inspection.kind = "X-ray or DRR image";
-  const Image2d image = read_image(path);
   inspection.facts["columns_rows"] = {image.width, image.height};
   add_value_facts(image.pixels, inspection);
+}
+
+/// The values are those of what is no padding.
+void inspect_dicom(const fs::path& path, Inspection& inspection) {
+  DicomXray xray = read_dicom_xray(path, std::nullopt);
+  if (!xray.padding.empty()) {
+    const auto& data = xray.data.pixels;
+    const auto padded = std::count(data.begin(), data.end(), 0.0f);
+    inspection.facts["padding"] = std::to_string(padded) + " pixels (" + xray.padding + ")";
+    for (std::size_t i = 0; i < data.size(); ++i)
+      if (data[i] == 0.0f) xray.image.pixels[i] = std::numeric_limits<float>::quiet_NaN();
+    std::erase_if(xray.image.pixels, [](float value) { return std::isnan(value); });
+  }
+  inspect_picture(xray.image, inspection);
 }
 
 }  // namespace
@@ -233,7 +247,7 @@ void inspect_image(const fs::path& path, const CtReadOptions& options, Inspectio
   check(format.has_value(), "inspect_image() is for image files");
   inspection.facts["format"] = format_name(*format);
   inspection.facts["file_sha256"] = sha256_of_file(path.string());
-  if (*format == ImageFormat::Dicom) return inspect_picture(path, inspection);
+  if (*format == ImageFormat::Dicom) return inspect_dicom(path, inspection);
   inspection.kind = "image";
   const ImageHeader header = read_image_header(path, *format);
   // Volumes whose values cannot be floats are read once, as CTs.
@@ -248,8 +262,9 @@ void inspect_image(const fs::path& path, const CtReadOptions& options, Inspectio
       throw InputError("size", std::to_string(seen.voxel_count()) + " voxels", "is too large");
   });
   if (!is_volume) {
-    inspect_picture(path, inspection);
-    inspection.facts["pixel_spacing_mm"] = {image.spacing_mm[0], image.spacing_mm[1]};
+    inspect_picture(read_image(path), inspection);
+    if (header.has_spacing && !header.size.empty())
+      inspection.facts["pixel_spacing_mm"] = {image.spacing_mm[0], image.spacing_mm[1]};
   } else if (image.channels == 1 && used_dimensions(image) == 3 &&
              (*format == ImageFormat::Tiff || holds_line_integrals(image))) {
     inspect_stack(image, inspection);

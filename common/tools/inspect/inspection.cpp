@@ -306,6 +306,7 @@ std::string draw_pictures(const fs::path& study_path,
         draw_study_pictures(study, study_case, ct_reading, folder, file_name_part(study_case.name));
     text += "case " + study_case.name + "\n";
     for (const std::string& fact : pictures.facts) text += "  " + indented(fact, "  ") + "\n";
+    for (const std::string& warning : pictures.ct_warnings) text += "  warning: " + warning + "\n";
     for (const std::string& telltale : pictures.telltales) text += "  LOOK: " + telltale + "\n";
     for (const fs::path& file : pictures.files) text += "  " + file.string() + "\n";
   }

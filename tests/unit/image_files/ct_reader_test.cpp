@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "image_files/ct_reader.h"
 
+#include <algorithm>
 #include <array>
+#include <clocale>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
@@ -282,6 +284,216 @@ TEST(CtReader, ChoosesOneOfSeveralSeriesAndSkipsWhatIsNoImage) {
   EXPECT_THAT(warnings, testing::ElementsAre(HasSubstr("skipped, not DICOM: README")));
 }
 
+std::string position(double x, double y, double z) {
+  return std::to_string(x) + "\\" + std::to_string(y) + "\\" + std::to_string(z);
+}
+
+/// The series with pixels (0, 0) to (1, 5), its first two columns, as padding of a stored value.
+auto padded_series(const fs::path& folder,
+                   int stored,
+                   const std::function<void(test::DicomTestFile&)>& edit) {
+  const CtVolume ct = asymmetric_ct(small_grid());
+  std::vector<std::int16_t> hu(ct.hu.view().begin(), ct.hu.view().end());
+  for (std::size_t i = 0; i < hu.size(); ++i)
+    if (i % 7 < 2) hu[i] = -1000;
+  write_dicom_series(ct, folder, [&](int slice, test::DicomTestFile& file) {
+    std::vector<std::int16_t> pixels;
+    for (std::size_t i = 0; i < 42; ++i)
+      pixels.push_back(static_cast<std::int16_t>(
+          i % 7 < 2 ? stored : hu[static_cast<std::size_t>(slice) * 42 + i] + 1024));
+    file.set_pixels(pixels);
+    edit(file);
+  });
+  CtVolume expected = ct;
+  expected.hu = SharedArray<std::int16_t>(std::move(hu));
+  return expected;
+}
+
+constexpr test::DicomTestFile::Tag kPaddingTag = {0x0028, 0x0120};
+constexpr test::DicomTestFile::Tag kPaddingLimitTag = {0x0028, 0x0121};
+
+/// How a file states what its padded pixels hold.
+struct Padding {
+  const char* name;
+  int stored;
+  std::vector<std::uint16_t> value;
+  const char* form;
+  std::vector<std::uint16_t> limit;
+  bool is_signed;
+  int bits;
+};
+
+TEST(CtReader, PaddingIsAirWhateverItsValueWouldMean) {
+  for (const Padding& padding : {Padding{"below all", -2000, {63536}, "SS", {}, true, 16},
+                                 Padding{"US of signed pixels", -2000, {63536}, "US", {}, true, 16},
+                                 Padding{"above all", 63536, {63536}, "US", {}, false, 16},
+                                 Padding{"SS of unsigned", 63536, {63536}, "SS", {}, false, 16},
+                                 Padding{"highest of 12 bits", 4095, {4095}, "US", {}, false, 12},
+                                 Padding{"beyond 12 bits", 63536, {63536}, "US", {}, false, 12},
+                                 Padding{"a range", 4001, {4000}, "US", {4095}, false, 12},
+                                 Padding{"its last value", 4095, {4000}, "US", {4095}, false, 12},
+                                 Padding{"its first value", 4000, {4095}, "US", {4000}, false, 12},
+                                 Padding{"zero", 0, {0}, "US", {}, false, 16}}) {
+    SCOPED_TRACE(padding.name);
+    const ScratchFolder folder;
+    const CtVolume expected =
+        padded_series(folder / "ct", padding.stored, [&](test::DicomTestFile& file) {
+          file.set_u16s(kPaddingTag, padding.value, padding.form);
+          if (!padding.limit.empty()) file.set_u16s(kPaddingLimitTag, padding.limit, padding.form);
+          file.set_u16({0x0028, 0x0101}, static_cast<std::uint16_t>(padding.bits));
+          file.set_u16({0x0028, 0x0102}, static_cast<std::uint16_t>(padding.bits - 1));
+          file.set_u16({0x0028, 0x0103}, padding.is_signed ? 1 : 0);
+        });
+    std::vector<std::string> warnings;
+    expect_same_ct(expected, read_ct(folder / "ct", {}, &warnings));
+    // 1 of 3 to 12 in each of 5 slices; told where the value would not have been air by itself.
+    const bool is_told = padding.stored > 0;
+    EXPECT_EQ(warnings.size(), is_told ? 1U : 0U);
+    EXPECT_THAT(warnings, testing::Each(HasSubstr("60 voxels of PixelPaddingValue")));
+    CtReadOptions raw;
+    raw.values = "raw";
+    raw.raw_slope_per_mm = 1e-5;
+    raw.raw_offset_per_mm = 0.02;
+    EXPECT_EQ(read_ct(folder / "ct", raw).hu[0], -1000) << "whatever voxels hold";
+  }
+}
+
+TEST(CtReader, PaddingNextToTheRangeIsData) {
+  const ScratchFolder folder;
+  (void)padded_series(folder / "ct", 4001, [](test::DicomTestFile& file) {
+    file.set_u16s(kPaddingTag, {4002});
+    file.set_u16s(kPaddingLimitTag, {4095});
+  });
+  EXPECT_EQ(read_ct(folder / "ct").hu[0], 4001 - 1024);
+}
+
+TEST(CtReader, PaddingMayDifferFromSliceToSlice) {
+  const ScratchFolder folder;
+  const CtVolume ct = asymmetric_ct(small_grid());
+  write_dicom_series(ct, folder / "ct", [&](int slice, test::DicomTestFile& file) {
+    std::vector<std::int16_t> pixels;
+    for (std::size_t i = 0; i < 42; ++i)
+      pixels.push_back(static_cast<std::int16_t>(
+          i == 0 ? 5000 + slice : ct.hu[static_cast<std::size_t>(slice) * 42 + i] + 1024));
+    file.set_pixels(pixels);
+    if (slice != 2) file.set_u16(kPaddingTag, static_cast<std::uint16_t>(5000 + slice));
+  });
+  const CtVolume found = read_ct(folder / "ct");
+  for (std::size_t slice = 0; slice < 5; ++slice)
+    EXPECT_EQ(found.hu[slice * 42], slice == 2 ? 5002 - 1024 : -1000);
+}
+
+TEST(CtReader, AValueAmidTheOthersIsPaddingOnlyAtTheSlicesEdge) {
+  const ScratchFolder folder;
+  const CtVolume ct = asymmetric_ct(small_grid());
+  // 0 HU, which soft tissue holds as well: pixels (0, 0), at the edge, and (3, 3), within.
+  write_dicom_series(ct, folder / "ct", [&](int slice, test::DicomTestFile& file) {
+    std::vector<std::int16_t> pixels;
+    for (std::size_t i = 0; i < 42; ++i)
+      pixels.push_back(static_cast<std::int16_t>(
+          i == 0 || i == 3 * 7 + 3 ? 1024
+                                   : ct.hu[static_cast<std::size_t>(slice) * 42 + i] + 1024));
+    file.set_pixels(pixels);
+    file.set_u16(kPaddingTag, 1024);
+  });
+  std::vector<std::string> warnings;
+  const CtVolume found = read_ct(folder / "ct", {}, &warnings);
+  EXPECT_EQ(found.hu[0], -1000);
+  EXPECT_EQ(found.hu[3 * 7 + 3], 0);
+  EXPECT_THAT(warnings,
+              testing::ElementsAre(HasSubstr("5 voxels of PixelPaddingValue 1024 are padding"),
+                                   HasSubstr("5 voxels of PixelPaddingValue 1024 away from")));
+}
+
+TEST(CtReader, GreysThatAreShownInvertedAreTheSameHu) {
+  const ScratchFolder folder;
+  const CtVolume ct = asymmetric_ct(small_grid());
+  write_dicom_series(ct, folder / "ct", [](int, test::DicomTestFile& file) {
+    file.set_text({0x0028, 0x0004}, "CS", "MONOCHROME1");
+  });
+  std::vector<std::string> warnings;
+  expect_same_ct(ct, read_ct(folder / "ct", {}, &warnings));
+  EXPECT_THAT(warnings, testing::ElementsAre(HasSubstr("MONOCHROME1")));
+}
+
+/// A JPEG-LS stream (ITU-T T.87) of one blank frame: lines of runs, whose code is one bit 1 for
+/// every full run of a length that grows with each (A.7.1), and one for the rest of a line.
+std::string blank_jpeg_ls(int columns, int rows) {
+  constexpr std::array<int, 32> kRunOrders = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2,  2,  3,  3,  3,  3,
+                                              4, 4, 5, 5, 6, 6, 7, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+  std::size_t ones = 0;
+  std::size_t index = 0;
+  for (int row = 0; row < rows; ++row) {
+    int left = columns;
+    while (left >= 1 << kRunOrders[index]) {
+      left -= 1 << kRunOrders[index];
+      ++ones;
+      index = std::min<std::size_t>(index + 1, kRunOrders.size() - 1);
+    }
+    if (left > 0) ++ones;
+  }
+  const auto u16 = [](int value) {
+    return std::string{static_cast<char>(value >> 8), static_cast<char>(value & 0xff)};
+  };
+  using namespace std::string_literals;
+  std::string stream = "\xff\xd8\xff\xf7\0\x0b\x10"s + u16(rows) + u16(columns) +
+                       "\x01\x01\x11\0\xff\xda\0\x08\x01\x01\0\0\0\0"s;
+  // Behind a byte of 8 ones a 0 is stuffed.
+  for (bool is_stuffed = false; ones > 0; is_stuffed = !is_stuffed) {
+    const std::size_t room = is_stuffed ? 7 : 8;
+    const std::size_t taken = std::min(room, ones);
+    stream += static_cast<char>(((1u << taken) - 1u) << (room - taken));
+    ones -= taken;
+    if (taken < room) break;
+  }
+  return stream + "\xff\xd9"s;
+}
+
+TEST(CtReader, BlankSlicesMayTakeNextToNothing) {
+  const ScratchFolder folder;
+  CtVolume ct;
+  ct.grid.size = {1024, 512, 3};
+  constexpr std::size_t kSlice = std::size_t{1024} * 512;
+  std::vector<std::int16_t> hu(3 * kSlice, -1000);
+  std::fill(hu.begin(), hu.begin() + kSlice, std::int16_t{-1024});
+  hu.back() = 500;
+  ct.hu = SharedArray<std::int16_t>(std::move(hu));
+  const std::string blank = blank_jpeg_ls(1024, 512);
+  ASSERT_LT(blank.size(), 2 * kSlice / 1000);
+  write_dicom_series(ct, folder / "ct", [&](int slice, test::DicomTestFile& file) {
+    if (slice == 0) file.set_fragment("1.2.840.10008.1.2.4.80", blank);
+  });
+  expect_same_ct(ct, read_ct(folder / "ct"));
+}
+
+TEST(CtReader, PositionsThatWereRoundedAreThoseOfEvenSlices) {
+  const ScratchFolder folder;
+  CtVolume ct = asymmetric_ct(small_grid());
+  ct.grid.size = {7, 6, 25};
+  ct.grid.spacing_mm.z() = 0.625;
+  std::vector<std::int16_t> hu(ct.grid.voxel_count(), 40);
+  hu[0] = -1000;
+  hu[1] = 700;
+  ct.hu = SharedArray<std::int16_t>(std::move(hu));
+  const auto series = [&](const std::string& name, double unit_mm, int missing) {
+    write_dicom_series(ct, folder / name, [&](int slice, test::DicomTestFile& file) {
+      const double z = -107.0 + 0.625 * (slice >= missing ? slice + 1 : slice);
+      file.set_text(
+          {0x0020, 0x0032}, "DS", position(-31.25, 12.5, std::round(z / unit_mm) * unit_mm));
+    });
+    return folder / name;
+  };
+  std::vector<std::string> warnings;
+  const CtVolume found = read_ct(series("tenths", 0.1, 99), {}, &warnings);
+  // Half a tenth at either end of 24 slice distances.
+  EXPECT_NEAR(found.grid.spacing_mm.z(), 0.625, 0.1 / 24);
+  EXPECT_THAT(warnings, testing::ElementsAre(HasSubstr("within the rounding of")));
+  EXPECT_THAT(test::message_of<InputError>([&] { (void)read_ct(series("missing", 0.1, 12)); }),
+              HasSubstr("a slice is missing"));
+  EXPECT_THAT(test::message_of<InputError>([&] { (void)read_ct(series("halves", 0.5, 99)); }),
+              HasSubstr("positions along the slice normal"));
+}
+
 TEST(CtReader, AppliesNiftiSlopeAndIntercept) {
   const ScratchFolder folder;
   const CtVolume ct = asymmetric_ct(small_grid());
@@ -375,10 +587,6 @@ auto dicom_text(test::DicomTestFile::Tag tag, const std::string& vr, const std::
   return dicom([=](int slice, test::DicomTestFile& file) {
     if (slice == 3) file.set_text(tag, vr, value);
   });
-}
-
-std::string position(double x, double y, double z) {
-  return std::to_string(x) + "\\" + std::to_string(y) + "\\" + std::to_string(z);
 }
 
 auto text_file(const std::string& text) {
@@ -549,6 +757,22 @@ std::vector<BadCt> bad_cts() {
        nrrd("(1,0,0) (0,1,0) (0,0,1)", "space units: \"m\" \"m\" \"m\"\n"),
        kInput,
        "space units"},
+      {"NrrdLeftHanded",
+       text_file("NRRD0004\ntype: short\ndimension: 3\nspace: 3D-left-handed\nsizes: 4 3 2\n"
+                 "encoding: raw\nendian: little\nspace directions: (1,0,0) (0,1,0) (0,0,1)\n\n" +
+                 bytes_of(small_voxels())),
+       kInput,
+       "space = 3D-left-handed"},
+      {"NrrdOfColours",
+       nrrd("(1,0,0) (0,1,0) (0,0,1)", "kinds: RGB-color domain domain\n"),
+       kInput,
+       "kinds = RGB-color domain domain"},
+      {"NrrdOriginIsText",
+       nrrd("(1,0,0) (0,1,0) (0,0,1)", "space origin: (1,two,3)\n"),
+       kInput,
+       "space origin"},
+      {"MetaInMetres", meta({{"DistanceUnits", "m"}}), kInput, "DistanceUnits"},
+      {"MetaTwoOrigins", meta({{"Position", "1 0 0"}}), kFile, "contradicts another key"},
       {"NrrdKeyTwice", nrrd("(1,0,0) (0,1,0) (0,0,1)", "encoding: gzip\n"), kFile, "stands twice"},
       {"NiftiHugeSlope", nifti_with<float>(112, {1e30f}), kInput, "scl_slope"},
       {"NiftiSlopeNextToNothing", nifti_with<float>(112, {1e-30f}), kInput, "scl_slope"},
@@ -603,15 +827,19 @@ std::vector<BadCt> bad_cts() {
       {"NiftiZeroSpacing", nifti_with<float>(80, {0.0f}), kInput, "pixdim[1]"},
       // srow_x = srow_y: two axes of the patient are one.
       {"NiftiFlatSform",
-       nifti_with_sform({1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0}),
+       nifti_with_sform({0.8f, 0, 0, 0, 0.8f, 0, 0, 0, 0, 0, 1.5f, 0}),
        kInput,
-       "sform = a sheared or singular map"},
-      {"NiftiShearedSform",
-       nifti_with_sform({-1, 0.5f, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0}),
+       "sform = an axis of 1.13"},
+      {"NiftiShearedSform",  // as long as pixdim says
+       nifti_with_sform({-0.8f, 0.72f, 0, 0, 0, -0.54f, 0, 0, 0, 0, 1.5f, 0}),
        kInput,
-       "must be orthogonal"},
+       "must be orthonormal"},
+      {"NiftiScaledSform",
+       nifti_with_sform({-0.8f, 0, 0, 0, 0, -0.91f, 0, 0, 0, 0, 1.5f, 0}),
+       kInput,
+       "sform = an axis of 0.91"},
       {"NiftiNanSform", nifti_with<float>(280, {nan}), kInput, "must be finite"},
-      {"NiftiNanSlope", nifti_with<float>(112, {nan}), kInput, "scl_slope"},
+      {"NiftiNanIntercept", nifti_with<float>(112, {2.0f, nan}), kInput, "scl_inter"},
       {"NiftiBadOffset", nifti_with<float>(108, {1e30f}), kFile, "vox_offset"},
       {"NiftiVersion2", nifti_with<std::int32_t>(0, {540}), kFile, "NIfTI-2"},
       // NRRD.
@@ -747,6 +975,160 @@ std::vector<BadCt> bad_cts() {
        kInput,
        "give the folder"},
   };
+}
+
+TEST(CtReader, ANiftiSlopeThatIsNoNumberIsNone) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const float infinity = std::numeric_limits<float>::infinity();
+  for (const float slope : {nan, infinity, 0.0f}) {
+    const ScratchFolder folder;
+    // With any intercept, which nibabel leaves out together with the slope.
+    const fs::path path = nifti_with<float>(112, {slope, nan})(folder.path());
+    expect_same_ct(asymmetric_ct(small_grid()), read_ct(path));
+  }
+}
+
+/// The small grid's axes, the second one leaning towards the first by a cosine.
+Eigen::Matrix3d leaning_axes(double cosine) {
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
+  axes.col(1) = Eigen::Vector3d(cosine, std::sqrt(1.0 - cosine * cosine), 0.0);
+  return axes;
+}
+
+// A CT 6 x 5 x 4 voxels wide: of 5 x 0.9 mm along the leaning axis, so a cosine c moves corners by
+// half of 4.5 c mm along the first axis and by half of 4.8 c mm along the second.
+TEST(CtReader, TakesTheNearestUprightAxesInEveryFormat) {
+  for (const double cosine : {5e-5, 2e-4, 9e-4, 1.1e-3}) {
+    SCOPED_TRACE(cosine);
+    const ScratchFolder folder;
+    const Eigen::Matrix3d axes = leaning_axes(cosine);
+    const CtGrid grid = small_grid();
+    const auto text = [](double value) {
+      std::ostringstream out;
+      out << std::setprecision(12) << value;
+      return out.str();
+    };
+    const auto join = [&](const Eigen::Vector3d& v, const char* between) {
+      return text(v.x()) + between + text(v.y()) + between + text(v.z());
+    };
+    const CtVolume upright = asymmetric_ct(grid);
+    const std::string voxels =
+        bytes_of(std::vector(upright.hu.view().begin(), upright.hu.view().end()));
+    write_bytes(folder / "ct.mha",
+                meta_header({{"DimSize", "7 6 5"},
+                             {"ElementSpacing", join(grid.spacing_mm, " ")},
+                             {"Offset", join(grid.origin_mm, " ")},
+                             {"TransformMatrix",
+                              join(axes.col(0), " ") + " " + join(axes.col(1), " ") + " " +
+                                  join(axes.col(2), " ")}}) +
+                    voxels);
+    std::string directions;
+    std::vector<float> rows(12);
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+      const Eigen::Vector3d column = axes.col(axis) * grid.spacing_mm[axis];
+      directions += (axis > 0 ? " (" : "(") + join(column, ",") + ")";
+      for (Eigen::Index row = 0; row < 3; ++row)
+        rows[static_cast<std::size_t>(4 * row + axis)] =
+            static_cast<float>(row < 2 ? -column[row] : column[row]);
+    }
+    for (std::size_t row = 0; row < 3; ++row)
+      rows[4 * row + 3] =
+          static_cast<float>((row < 2 ? -1 : 1) * grid.origin_mm[static_cast<Eigen::Index>(row)]);
+    write_bytes(folder / "ct.nrrd",
+                "NRRD0004\ntype: short\ndimension: 3\nspace: LPS\nsizes: 7 6 5\nencoding: raw\n"
+                "endian: little\nspace directions: " +
+                    directions + "\nspace origin: (" + join(grid.origin_mm, ",") + ")\n\n" +
+                    voxels);
+    for (const fs::path& path :
+         {folder / "ct.mha", folder / "ct.nrrd", nifti_with_sform(rows)(folder.path())}) {
+      SCOPED_TRACE(path);
+      std::vector<std::string> warnings;
+      if (cosine > 1e-3) {
+        EXPECT_THAT(test::message_of<InputError>([&] { (void)read_ct(path); }),
+                    HasSubstr("orthonormal"));
+        continue;
+      }
+      const CtVolume found = read_ct(path, {}, &warnings);
+      EXPECT_LT(
+          (found.grid.direction.transpose() * found.grid.direction - Eigen::Matrix3d::Identity())
+              .norm(),
+          1e-12);
+      EXPECT_LT(largest_corner_distance_mm(upright.grid, found.grid), 4.8 * cosine + 1e-5);
+      EXPECT_EQ(warnings.size(), cosine * 4.8 / 2.0 * std::sqrt(0.5) > 1e-3 ? 1U : 0U);
+    }
+  }
+}
+
+/// "NRRD ... space: NAME" with axes along the space's own.
+std::string nrrd_in_space(const std::string& space) {
+  return "NRRD0004\ntype: short\ndimension: 3\n" + space +
+         "sizes: 4 3 2\nencoding: raw\nendian: little\n"
+         "space directions: (0.5,0,0) (0,0.75,0) (0,0,2)\nspace origin: (1.5,2.5,3.5)\n\n" +
+         bytes_of(small_voxels());
+}
+
+TEST(CtReader, TurnsEverySpaceOfANrrdIntoLps) {
+  struct Space {
+    const char* name;
+    Eigen::Vector3d signs;
+    bool is_of_patient;
+  };
+  for (const Space& space : {Space{"space: left-posterior-superior\n", {1, 1, 1}, true},
+                             Space{"space: LPS\n", {1, 1, 1}, true},
+                             Space{"space: right-anterior-superior\n", {-1, -1, 1}, true},
+                             Space{"space: RAS\n", {-1, -1, 1}, true},
+                             Space{"space: left-anterior-superior\n", {1, -1, 1}, true},
+                             Space{"space: las\n", {1, -1, 1}, true},
+                             Space{"space: right-posterior-inferior\n", {-1, 1, -1}, true},
+                             Space{"space: scanner-xyz\n", {1, 1, 1}, false},
+                             Space{"space: 3D-right-handed\n", {1, 1, 1}, false},
+                             Space{"space dimension: 3\n", {1, 1, 1}, false}}) {
+    SCOPED_TRACE(space.name);
+    const ScratchFolder folder;
+    write_bytes(folder / "ct.nrrd", nrrd_in_space(space.name));
+    std::vector<std::string> warnings;
+    const CtVolume ct = read_ct(folder / "ct.nrrd", {}, &warnings);
+    const Eigen::Vector3d expected = Eigen::Vector3d(1.5 + 3 * 0.5, 2.5 + 2 * 0.75, 3.5 + 2);
+    EXPECT_EQ(ct.grid.point_mm({3, 2, 1}), space.signs.cwiseProduct(expected));
+    EXPECT_EQ(warnings.size(), space.is_of_patient ? 0U : 1U);
+  }
+}
+
+/// The calling process with decimal commas while it lives; none where the locale cannot be made.
+class CommaLocale {
+ public:
+  CommaLocale() {
+    const std::string made = folder_ / "de_DE.UTF-8";
+    const std::string command = "localedef -i de_DE -f UTF-8 " + made + " >/dev/null 2>&1";
+    is_there_ = std::system(command.c_str()) == 0 &&
+                ::setenv("LOCPATH", folder_.path().c_str(), 1) == 0 &&
+                std::setlocale(LC_ALL, "de_DE.UTF-8") != nullptr && std::to_string(0.5)[1] == ',';
+  }
+  ~CommaLocale() {
+    std::setlocale(LC_ALL, "C");
+    ::unsetenv("LOCPATH");
+  }
+  CommaLocale(const CommaLocale&) = delete;
+  CommaLocale& operator=(const CommaLocale&) = delete;
+  [[nodiscard]] bool is_there() const { return is_there_; }
+
+ private:
+  ScratchFolder folder_;
+  bool is_there_ = false;
+};
+
+TEST(CtReader, ReadsAndWritesPointsWhateverTheHostProgramsLocale) {
+  const CommaLocale locale;
+  if (!locale.is_there()) GTEST_SKIP() << "no German locale can be made here";
+  const ScratchFolder folder;
+  const CtVolume ct = asymmetric_ct(small_grid());
+  for (const char* name : {"ct.mha", "ct.nrrd", "ct.nii.gz"}) {
+    SCOPED_TRACE(name);
+    write_ct(ct, folder / name);
+    expect_same_ct(ct, read_ct(folder / name));
+  }
+  write_dicom_series(ct, folder / "dicom");
+  expect_same_ct(ct, read_ct(folder / "dicom"));
 }
 
 class CtReaderRefuses : public testing::TestWithParam<BadCt> {};
@@ -1039,6 +1421,21 @@ TEST(CtReaderResamples, UnevenSlicesAndLeavesEvenOnesAlone) {
   test::write_dicom_series(even, folder / "even");
   EXPECT_EQ(identity_of(read_ct(folder / "even", options)).content_sha256,
             identity_of(even).content_sha256);
+}
+
+TEST(CtReaderResamples, PaddingAsTheAirThatItIs) {
+  const test::ScratchFolder folder;
+  (void)padded_series(folder / "ct", 30000, [slice = 0](test::DicomTestFile& file) mutable {
+    file.set_u16(kPaddingTag, 30000);
+    file.set_text(
+        {0x0020, 0x0032}, "DS", position(-31.25, 12.5 + 0.45 * slice, -107 + 1.5 * slice));
+    ++slice;
+  });
+  CtReadOptions options;
+  options.resamples = true;
+  const CtVolume ct = read_ct(folder / "ct", options);
+  // The stored CT's highest HU is 1004; between air and tissue all is lower.
+  EXPECT_LT(*std::max_element(ct.hu.view().begin(), ct.hu.view().end()), 1100);
 }
 
 TEST(CtReaderResamples, NoGapThatWouldBeMadeUp) {

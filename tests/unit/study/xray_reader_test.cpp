@@ -260,6 +260,77 @@ TEST_F(DicomXrayView, LogarithmsAreNoIntensitiesAndDisplayValuesAreWarnedOf) {
   EXPECT_THAT(read({}, attenuation).warnings, testing::Contains(HasSubstr("takes no logarithm")));
 }
 
+constexpr test::DicomTestFile::Tag kPaddingTag = {0x0028, 0x0120};
+
+TEST_F(DicomXrayView, PaddingIsMaskedAndNeitherAirNorMetal) {
+  // Of kLevels the 500 becomes padding: by its own value, one above all, and one beyond the bits.
+  for (const int padding : {0, 4095, 63536}) {
+    SCOPED_TRACE(padding);
+    const auto pad = [&](test::DicomTestFile& file) {
+      std::vector<std::int16_t> pixels(kLevels.begin(), kLevels.end());
+      pixels[3] = static_cast<std::int16_t>(padding);
+      file.set_pixels(pixels);
+      file.set_u16(kPaddingTag, static_cast<std::uint16_t>(padding));
+    };
+    const ViewXray xray = read(pad);
+    EXPECT_THAT(xray.mask.pixels, testing::ElementsAre(1, 1, 1, 0, 1, 1));
+    EXPECT_NEAR(xray.attenuation.pixels[2], std::log(4.0), kLogRounding);
+    EXPECT_LE(xray.attenuation.pixels[3], xray.attenuation.pixels[2]) << "no metal";
+    EXPECT_GT(xray.attenuation.pixels[3], xray.attenuation.pixels[0]) << "no air";
+    EXPECT_THAT(xray.note, HasSubstr("16.7 % masked as padding (PixelPaddingValue"));
+    const ViewXray turned = read([&](test::DicomTestFile& file) {
+      pad(file);
+      file.set_text(kPhotometricTag, "CS", "MONOCHROME1");
+    });
+    EXPECT_EQ(turned.mask.pixels, xray.mask.pixels);
+  }
+}
+
+TEST_F(DicomXrayView, PaddingDoesNotMoveTheAirLevel) {
+  const auto by_percentile = [](StudyView& view) { view.reading.air = AirSource::Percentile; };
+  const ViewXray xray = read(
+      [](test::DicomTestFile& file) {
+        std::vector<std::int16_t> pixels(kLevels.begin(), kLevels.end());
+        pixels[3] = 4095;
+        file.set_pixels(pixels);
+        file.set_u16(kPaddingTag, 4095);
+      },
+      by_percentile);
+  EXPECT_THAT(xray.note, HasSubstr("air level 4000"));
+}
+
+TEST_F(DicomXrayView, PaddingThatHidesTheRegionIsRefused) {
+  const auto all_but_one = [](test::DicomTestFile& file) {
+    file.set_pixels({0, 0, 0, 500, 0, 4000});
+    file.set_u16(kPaddingTag, 0);
+  };
+  const auto region = [](StudyView& view) { view.roi = {0, 0, 3, 2}; };
+  EXPECT_THAT(refusal(all_but_one, region),
+              HasSubstr("PixelPaddingValue 0 = padding: hides 66.7 %"));
+  EXPECT_THAT(refusal([](test::DicomTestFile& file) {
+                file.set_pixels({9, 9, 9, 9, 9, 9});
+                file.set_u16(kPaddingTag, 9);
+              }),
+              HasSubstr("nothing but padding"));
+}
+
+TEST_F(DicomXrayView, PixelSpacingThatIsNoneIsIgnoredWhenTheStudySaysSo) {
+  const auto ignore = [](StudyView& view) { view.reading.ignores_spacing = true; };
+  const auto of_detector = [](test::DicomTestFile& file) {
+    file.set_text({0x0018, 0x1164}, "DS", "0.000\\0.000");
+  };
+  EXPECT_THAT(refusal(of_detector), HasSubstr("must be two positive numbers"));
+  expect_lines_of_levels(read(of_detector, ignore));
+  const auto of_patient = [](test::DicomTestFile& file) {
+    file.erase({0x0018, 0x1164});
+    file.set_text({0x0028, 0x0030}, "DS", "0.000\\0.000");
+  };
+  expect_lines_of_levels(read(of_patient, ignore));
+  EXPECT_THAT(read(of_patient, ignore).warnings, testing::IsEmpty());
+  expect_lines_of_levels(read(of_patient));
+  EXPECT_THAT(read(of_patient).warnings, testing::ElementsAre(HasSubstr("not checked")));
+}
+
 TEST_F(DicomXrayView, ItsPixelSpacingIsTheCamerasOrTheErrorNamesBoth) {
   const auto spacing = [](test::DicomTestFile& file) {
     file.set_text({0x0018, 0x1164}, "DS", "0.3\\0.4");  // rows, then columns

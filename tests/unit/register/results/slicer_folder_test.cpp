@@ -61,7 +61,7 @@ TEST(SlicerFiles, PutImagesOnTheirDetectorsInTheRoom) {
     EXPECT_EQ(read_image(xray).pixels, view.xray.pixels);
     // The X-rays of this case are DRRs at this very pose.
     EXPECT_EQ(read_image(folder / ("drr-" + camera.name + ".nrrd")).pixels, view.xray.pixels);
-    const RawImage header = read_raw_image_header(xray, ImageFormat::Nrrd);
+    const ImageHeader header = read_image_header(xray, ImageFormat::Nrrd);
     constexpr double kWrittenDigitsMm = 1e-9;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const auto row = static_cast<Eigen::Index>(axis);

@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <array>
+#include <cerrno>
 #include <cstdint>
 #include <fstream>
 #include <string>
 #include <string_view>
+#include <sys/mman.h>
+#include <system_error>
+#include <unistd.h>
 #include <zlib.h>
 
 #include "base/error.h"
@@ -45,12 +49,15 @@ void check_png_header(const std::string& path, std::string_view data) {
         "colour type " + std::to_string(color) + ", " + std::to_string(depth) + " bits");
 }
 
-}  // namespace
-
-void check_png(const fs::path& path) {
+/// Walks the chunks of a PNG file with their checksums up to its end mark. The file's bytes, but of
+/// its chunks only those of the stored values: others (sBIT, tRNS) make ITK change these.
+std::string plain_png(const fs::path& path) {
   const std::uint64_t file_bytes = existing_file_size(path, path);
   std::ifstream file = open_input_file(path);
-  std::uint64_t at = 8;  // behind the signature
+  constexpr std::uint64_t kSignatureBytes = 8;
+  std::string plain(kSignatureBytes, '\0');
+  file.read(plain.data(), static_cast<std::streamsize>(plain.size()));
+  std::uint64_t at = kSignatureBytes;
   for (bool is_first = true;; is_first = false) {
     std::array<char, 8> head{};
     file.seekg(static_cast<std::streamoff>(at));
@@ -70,9 +77,42 @@ void check_png(const fs::path& path) {
     if (is_first && (type != "IHDR" || length != 13))
       throw FileError(path.string(), "PNG file does not begin with its header");
     if (is_first) check_png_header(path.string(), data);
-    if (type == "IEND") return;
+    if (type == "IHDR" || type == "IDAT" || type == "IEND")
+      plain.append(head.data(), head.size()).append(data);
+    if (type == "IEND") return plain;
     at += 12 + length;
   }
+}
+
+/// Bytes that a library can open as a file; kept in memory.
+class BytesAsFile {
+ public:
+  BytesAsFile(const std::string& what, std::string_view bytes)
+      : descriptor_(memfd_create("image", MFD_CLOEXEC)) {
+    while (descriptor_ >= 0 && !bytes.empty()) {
+      const ssize_t written = ::write(descriptor_, bytes.data(), bytes.size());
+      if (written <= 0) break;
+      bytes.remove_prefix(static_cast<std::size_t>(written));
+    }
+    if (descriptor_ >= 0 && bytes.empty()) return;
+    const std::string trouble = std::generic_category().message(errno);
+    if (descriptor_ >= 0) ::close(descriptor_);
+    throw FileError(what, "cannot be held in memory: " + trouble);
+  }
+  ~BytesAsFile() { ::close(descriptor_); }
+  BytesAsFile(const BytesAsFile&) = delete;
+  BytesAsFile& operator=(const BytesAsFile&) = delete;
+  [[nodiscard]] fs::path path() const { return "/proc/self/fd/" + std::to_string(descriptor_); }
+
+ private:
+  int descriptor_;
+};
+
+}  // namespace
+
+RawImage read_png(const fs::path& path, const AcceptImage& accept) {
+  const BytesAsFile plain(path.string(), plain_png(path));
+  return read_raw_image(plain.path(), ImageFormat::Png, accept);
 }
 
 }  // namespace af::image_formats
