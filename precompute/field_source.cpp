@@ -85,7 +85,7 @@ NamedSource named_source(const PrecomputeOptions& options,
                          const Communicator& communicator,
                          std::vector<std::string>& warnings) {
   if (!options.study.empty()) {
-    const Study study = shared_study(options.study, communicator, &warnings);
+    const Study study = shared_study(options.study, communicator);
     return all_or_none(communicator, [&] { return source_of_study(options, study); });
   }
   all_or_none(communicator, [&] {

@@ -232,7 +232,7 @@ std::shared_ptr<const MeasuredViews> load_measured_views(const PrecomputeOptions
                                                          const Eigen::Vector3d& beam_ct,
                                                          const Communicator& communicator,
                                                          std::vector<std::string>& warnings) {
-  const Study study = shared_study(options.projections, communicator, &warnings);
+  const Study study = shared_study(options.projections, communicator);
   auto found = std::make_shared<MeasuredViews>();
   found->path = options.projections;
   std::vector<StudyView> views;

@@ -92,13 +92,11 @@ void warn_of(const std::vector<std::string>& texts, const Communicator& world) {
 /// Collective.
 CaseToRegister read_case(const RegisterOptions& options, const Communicator& world) {
   CaseToRegister found;
-  std::vector<std::string> notes;
-  found.study = shared_study(options.study, world, &notes);
-  warn_of(notes, world);
+  found.study = shared_study(options.study, world);
   found.of = all_or_none(world, [&] { return found.study.find_case(options.case_name); });
   if (starts_from_landmarks(options, found.of))
     found.landmarks = all_or_none(world, [&] { return landmark_pose(found.study, found.of); });
-  notes.clear();
+  std::vector<std::string> notes;
   found.starts = shared_poses(world, [&] {
     if (found.landmarks.has_value()) return std::vector{found.landmarks->room_from_ct};
     return start_poses(options, pose_context(found.study, found.of, options.ct), notes);

@@ -10,15 +10,13 @@
 
 namespace af {
 
-Study shared_study(const std::filesystem::path& path,
-                   const Communicator& communicator,
-                   std::vector<std::string>* warnings) {
+Study shared_study(const std::filesystem::path& path, const Communicator& communicator) {
   std::string study_text;
   std::string rig_text;
   Study study = all_or_none(communicator, [&] {
     if (!communicator.is_root()) return Study();
     study_text = read_text_file(path);
-    Study found = read_study(path, warnings);
+    Study found = read_study(path);
     rig_text = rig_to_toml(found.rig);
     return found;
   });

@@ -15,12 +15,10 @@
 namespace af {
 
 /// Collective. read_study() on rank 0; the others are sent what it read. What it throws, every rank
-/// throws. `warnings` are rank 0's.
-Study shared_study(const std::filesystem::path& path,
-                   const Communicator& communicator,
-                   std::vector<std::string>* warnings = nullptr);
+/// throws. What is odd about its rig is told by af-inspect.
+Study shared_study(const std::filesystem::path& path, const Communicator& communicator);
 
-/// Collective. read_rig() on rank 0, in the same way.
+/// Collective. read_rig() on rank 0, in the same way; `warnings` are rank 0's.
 CameraRig shared_rig(const std::string& name_or_path,
                      const Communicator& communicator,
                      std::vector<std::string>* warnings = nullptr);

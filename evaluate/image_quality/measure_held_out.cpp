@@ -236,15 +236,13 @@ void run_held_out(const HeldOutOptions& options,
                   const std::string& /*command_line*/,
                   const Communicator& world) {
   const std::filesystem::path csv = csv_beside(options.output);
-  std::vector<std::string> warnings;
   all_or_none(world, [&] {
     throw_if_any(problems(options));
     if (!world.is_root()) return;
     announce_output(csv);
     announce_output(options.output);
   });
-  const Study study = shared_study(options.study, world, &warnings);
-  for (const std::string& text : warnings) warn(world, text);
+  const Study study = shared_study(options.study, world);
   const std::vector<const StudyCase*> chosen = all_or_none(world, [&] {
     std::vector<const StudyCase*> cases = study.chosen_cases(options.cases);
     for (const StudyCase* study_case : cases)

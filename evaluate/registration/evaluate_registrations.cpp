@@ -476,7 +476,6 @@ void run_registration(const RegistrationStudyOptions& options,
                       const std::string& command_line,
                       const Communicator& world) {
   const std::filesystem::path& folder = options.output_folder;
-  std::vector<std::string> study_warnings;
   all_or_none(world, [&] {
     throw_if_any(problems(options));
     if (world.is_root()) require_gnuplot();
@@ -490,8 +489,7 @@ void run_registration(const RegistrationStudyOptions& options,
                   "summary.json"},
                  options.resume.restarts},
                 world);
-  const Study study = shared_study(options.study, world, &study_warnings);
-  for (const std::string& text : study_warnings) warn(world, text);
+  const Study study = shared_study(options.study, world);
   const std::vector<StudyCase> cases =
       all_or_none(world, [&] { return chosen_cases(options, study); });
   run.open();

@@ -6,7 +6,6 @@
 
 #include "base/error.h"
 #include "files/output_file.h"
-#include "run/terminal.h"
 #include "study/rig_file.h"
 
 namespace af::evaluation {
@@ -67,11 +66,7 @@ void run_join_studies(const JoinStudiesOptions& options,
     if (!world.is_root()) return;
     announce_output(options.output);
     std::vector<Study> studies;
-    for (const std::filesystem::path& path : options.studies) {
-      std::vector<std::string> warnings;
-      studies.push_back(read_study(path, &warnings));
-      for (const std::string& text : warnings) warn(world, text);
-    }
+    for (const std::filesystem::path& path : options.studies) studies.push_back(read_study(path));
     const Study joined = joined_study(studies, options.fields, options.output);
     write_text_file(options.output, study_to_toml(joined, joined.path.parent_path()));
     std::cout << "study of " << joined.cases.size()

@@ -20,7 +20,6 @@
 #include "files/sha256.h"
 #include "gold_standard/target_box.h"
 #include "run/run_folder.h"
-#include "run/terminal.h"
 #include "study/case_gold_standard.h"
 #include "study/shared_inputs.h"
 #include "text/csv_table.h"
@@ -266,7 +265,6 @@ void run_similarity_curves(const SimilarityCurvesOptions& options,
                            const std::string& command_line,
                            const Communicator& world) {
   const std::filesystem::path& folder = options.output_folder;
-  std::vector<std::string> warnings;
   all_or_none(world, [&] {
     throw_if_any(problems(options));
     if (world.is_root()) require_gnuplot();
@@ -276,8 +274,7 @@ void run_similarity_curves(const SimilarityCurvesOptions& options,
                  options.resume.restarts},
                 world);
   run.open();
-  const Study study = shared_study(options.study, world, &warnings);
-  for (const std::string& text : warnings) warn(world, text);
+  const Study study = shared_study(options.study, world);
   const StudyCase study_case =
       all_or_none(world, [&] { return study.find_case(options.case_name); });
   const GoldStandard gold =

@@ -20,7 +20,6 @@
 #include "gold_standard/target_box.h"
 #include "gold_standard/tre.h"
 #include "run/progress_printer.h"
-#include "run/terminal.h"
 #include "study/case_gold_standard.h"
 #include "study/shared_inputs.h"
 #include "text/csv_table.h"
@@ -187,15 +186,13 @@ void run_lattice_errors(const LatticeErrorsOptions& options,
                         const std::string& /*command_line*/,
                         const Communicator& world) {
   const std::filesystem::path csv = csv_beside(options.output);
-  std::vector<std::string> warnings;
   all_or_none(world, [&] {
     throw_if_any(problems(options));
     if (!world.is_root()) return;
     announce_output(csv);
     announce_output(options.output);
   });
-  const Study study = shared_study(options.study, world, &warnings);
-  for (const std::string& text : warnings) warn(world, text);
+  const Study study = shared_study(options.study, world);
   const StudyCase study_case =
       all_or_none(world, [&] { return study.find_case(options.case_name); });
   const GoldStandard gold =
