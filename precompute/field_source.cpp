@@ -12,6 +12,7 @@
 #include "study/pose_context.h"
 #include "study/rig_file.h"
 #include "study/shared_inputs.h"
+#include "study/target_place.h"
 
 namespace af {
 
@@ -21,7 +22,7 @@ namespace {
 struct NamedSource {
   std::string ct_path;
   CtReadOptions ct_reading;
-  StudyPlaces places;  ///< where the study names its files
+  std::optional<StudyCase> study_case;
   CameraRig rig;
   std::string camera;
   std::optional<PoseFrame> frame;
@@ -39,7 +40,7 @@ NamedSource source_of_study(const PrecomputeOptions& options, const Study& study
   NamedSource source;
   source.ct_path = study_case.ct.string();
   source.ct_reading = ct_reading_in_force(options.ct_reading, study_case.ct_reading);
-  source.places = study_case.places;
+  source.study_case = study_case;
   source.rig = study.rig;
   source.frame = study_case.frame();
   std::vector<std::string> cameras;
@@ -134,10 +135,13 @@ FieldSource load_source(const PrecomputeOptions& options, const Communicator& co
   FieldSource source;
   const NamedSource named = named_source(options, communicator, source.warnings);
   source.camera = all_or_none(communicator, [&] { return named.rig.camera(named.camera); });
-  const NodeCt ct = naming_study_line(named.places, "ct", [&] {
+  const StudyPlaces places = named.study_case ? named.study_case->places : StudyPlaces();
+  const NodeCt ct = naming_study_line(places, "ct", [&] {
     return read_ct_per_node(
         named.ct_path, named.ct_reading, options.attenuation, communicator, source.warnings);
   });
+  if (named.study_case)
+    all_or_none(communicator, [&] { require_target_in_ct(*named.study_case, ct.facts.grid); });
   source.volume = options.is_of_bone() ? bone_per_node(*ct.volume, communicator) : ct.volume;
   source.ct_path = named.ct_path;
   source.ct_reading = named.ct_reading;

@@ -19,6 +19,7 @@
 #include "study/node_ct.h"
 #include "study/rig_file.h"
 #include "study/shared_inputs.h"
+#include "study/target_place.h"
 #include "study/xray_reader.h"
 
 namespace af::registration {
@@ -343,6 +344,8 @@ LoadedCase load_case(const Study& study,
                            loaded.warnings);
     });
   }
+  if (ct.has_value())
+    all_or_none(communicator, [&] { require_target_in_ct(study_case, ct->grid); });
   if (looks_up) {
     use_fields(study_case, options, communicator, ct, *problem, loaded);
     if (volumes.all) add_ray_casts(volumes, ray_cast, options, communicator, *problem);

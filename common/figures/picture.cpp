@@ -173,8 +173,10 @@ void draw_mark(
     case PictureMark::Shape::Dot:
       canvas.circle(x, y, 0.8 * size, color, 0.0);
       break;
-    case PictureMark::Shape::None: {
-      const Font font{std::round(4.0 * size), true};
+    case PictureMark::Shape::None:
+    case PictureMark::Shape::Label: {
+      const bool is_large = mark.shape == PictureMark::Shape::None;
+      const Font font{std::round(is_large ? 4.0 * size : std::max(11.0, 2.4 * size)), is_large};
       draw_rimmed_text(canvas,
                        x - canvas.text_width(mark.text, font) / 2.0,
                        y + 0.36 * font.size_px,

@@ -22,10 +22,10 @@ struct PictureLine {
 
 /// A small mark with a text beside it.
 struct PictureMark {
-  enum class Shape { None, Cross, Circle, Dot };
+  enum class Shape { None, Label, Cross, Circle, Dot };
   std::array<double, 2> place = {0.0, 0.0};
   Shape shape = Shape::None;
-  std::string text;  ///< None: centred on the place, in large letters
+  std::string text;  ///< None and Label: centred on the place, in large and small letters
   PictureColor color = PictureColor::Yellow;
 };
 

@@ -15,6 +15,24 @@ bool shows_one(const StudyView& view) {
                              [](const auto& point) { return point.has_value(); });
 }
 
+/// What a residual means for a start: how well marks of one pose agree, in mm at their places.
+std::string marks_verdict(const LandmarkPose& pose, const StudyCase& study_case) {
+  /// A registration this near counts as a success.
+  constexpr double kSuccessMm = 2.5;
+  /// Most registrations succeed from starts this far off (docs/howto/bones.md, docs/population.md).
+  constexpr double kStartMm = 10.0;
+  if (pose.rms_mm <= kSuccessMm)
+    return "good: within the 2.5 mm that count as a successful registration";
+  if (pose.rms_mm <= kStartMm)
+    return "rough: beyond the 2.5 mm that count as a successful registration, but within the 10 mm "
+           "from which most succeed";
+  const LandmarkResidual& worst =
+      *std::ranges::max_element(pose.residuals, {}, &LandmarkResidual::mm);
+  return "bad: beyond the 10 mm from which most registrations succeed; look at the marks again, " +
+         study_case.views[worst.view].camera + " #" + std::to_string(worst.landmark + 1) +
+         " first: the same point in CT and X-ray, LPS mm, (column, row)?";
+}
+
 }  // namespace
 
 bool has_landmarks(const StudyCase& study_case) {
@@ -42,8 +60,9 @@ LandmarkPose landmark_pose(const Study& study, const StudyCase& study_case) {
 }
 
 std::string residuals_text(const LandmarkPose& pose, const StudyCase& study_case) {
-  std::string text = "landmarks   " + fixed_text(pose.rms_px, 1) + " px, " +
-                     fixed_text(pose.rms_mm, 2) + " mm from where they were seen (RMS);";
+  std::string text =
+      "landmarks   " + fixed_text(pose.rms_px, 1) + " px, " + fixed_text(pose.rms_mm, 2) +
+      " mm from where they were seen (RMS): " + marks_verdict(pose, study_case) + "\n           ";
   for (const LandmarkResidual& residual : pose.residuals)
     text += " " + study_case.views[residual.view].camera + " #" +
             std::to_string(residual.landmark + 1) + " " + fixed_text(residual.px, 1) + " px, " +

@@ -9,6 +9,8 @@
 #include "base/error.h"
 #include "base/stored_bytes.h"
 #include "spectrum/bone_volume.h"
+#include "study/ct_keys.h"
+#include "study/target_place.h"
 #include "volume/cut_faces.h"
 
 namespace af {
@@ -81,6 +83,16 @@ std::shared_ptr<const AttenuationVolume> bone_per_node(const AttenuationVolume& 
   if (!(bone->max_mu_per_mm() > 0.0))
     throw InputError("the CT has no bone: no voxel attenuates more than soft tissue does");
   return bone;
+}
+
+CtVolume read_case_ct(const StudyCase& study_case,
+                      const CtReadOptions& typed,
+                      std::vector<std::string>* warnings) {
+  CtVolume ct = naming_study_line(study_case.places, "ct", [&] {
+    return read_ct(study_case.ct, ct_reading_in_force(typed, study_case.ct_reading), warnings);
+  });
+  require_target_in_ct(study_case, ct.grid);
+  return ct;
 }
 
 NodeCt read_ct_per_node(const std::filesystem::path& path,

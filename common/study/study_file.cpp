@@ -17,6 +17,7 @@
 #include "study/ct_keys.h"
 #include "study/landmark_start.h"
 #include "study/rig_file.h"
+#include "study/target_place.h"
 #include "text/toml_reader.h"
 
 namespace af {
@@ -82,10 +83,11 @@ bool are_collinear(const std::vector<Eigen::Vector3d>& points) {
   return !(singular_values[1] > kLeastWidth * kLeastWidth * singular_values[0]);
 }
 
-CtBox get_target_box(TomlTableReader& reader) {
+CtBox get_target_box(TomlTableReader& reader, StudyPlaces& places) {
   CtBox box{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
   const auto corners = reader.get_matrix("target_box_ct_mm", 2, 3, Presence::Required);
   if (!corners) return box;
+  places["target_box_ct_mm"] = reader.place("target_box_ct_mm");
   box = {corners->row(0).transpose(), corners->row(1).transpose()};
   if (const std::string problem = target_box_problem(box); !problem.empty())
     reader.add_problem("target_box_ct_mm", problem);
@@ -297,6 +299,30 @@ void read_views(TomlTableReader& reader,
   }
 }
 
+/// Without a stated pose the target's centre lies at the isocentre, with the patient's axes along
+/// the room's.
+RigidTransform pose_at_isocenter(const CameraRig& rig, const StudyCase& study_case) {
+  return PoseFrame{Eigen::Matrix3d::Identity(), study_case.center_ct_mm, rig.isocenter_point}
+      .nominal_room_from_ct();
+}
+
+/// The nominal pose must show the target box to every camera of the case.
+void check_beams(TomlTableReader& reader,
+                 const StudyContext& context,
+                 const StudyCase& study_case) {
+  if (!context.problems.empty()) return;
+  for (const StudyView& view : study_case.views) {
+    const std::string problem = beam_problem(study_case, context.rig.camera(view.camera));
+    if (problem.empty()) continue;
+    if (reader.has("nominal_room_from_ct"))
+      reader.add_problem("nominal_room_from_ct",
+                         problem + "; without this key center_ct_mm is put at the isocentre");
+    else
+      reader.add_problem("target_box_ct_mm", problem);
+    return;
+  }
+}
+
 /// A case that states landmarks and no nominal pose has the landmarks' pose as nominal one.
 void take_nominal_from_landmarks(TomlTableReader& reader,
                                  const StudyContext& context,
@@ -323,13 +349,11 @@ StudyCase read_case(const toml::table& table,
       get_path(reader, "ct", Presence::Required, context.folder, study_case.places).value_or("");
   study_case.ct_reading = read_ct_keys(reader);
   study_case.landmarks_ct_mm = get_points<3>(reader, "landmarks_ct_mm");
-  const auto nominal =
-      reader.get_pose("nominal_room_from_ct",
-                      study_case.landmarks_ct_mm.empty() ? Presence::Required : Presence::Optional);
-  study_case.nominal_room_from_ct = nominal.value_or(RigidTransform::Identity());
   study_case.center_ct_mm =
       reader.get_vector<3>("center_ct_mm", Presence::Required).value_or(Eigen::Vector3d::Zero());
-  study_case.target_box_ct = get_target_box(reader);
+  study_case.nominal_room_from_ct = reader.get_pose("nominal_room_from_ct", Presence::Optional)
+                                        .value_or(pose_at_isocenter(context.rig, study_case));
+  study_case.target_box_ct = get_target_box(reader, study_case.places);
   study_case.fiducials_ct_mm = get_points<3>(reader, "fiducials_ct_mm");
   if (!study_case.fiducials_ct_mm.empty() && are_collinear(study_case.fiducials_ct_mm))
     reader.add_problem("fiducials_ct_mm", "must be at least 3 points that are not collinear");
@@ -337,6 +361,7 @@ StudyCase read_case(const toml::table& table,
   read_views(reader, prefix, study_case, context);
   if (!reader.has("nominal_room_from_ct") && !study_case.landmarks_ct_mm.empty())
     take_nominal_from_landmarks(reader, context, study_case);
+  check_beams(reader, context, study_case);
   reader.refuse_unknown_keys();
   return study_case;
 }

@@ -27,11 +27,13 @@ ct = "patient-01/ct.nii.gz"                      # in HU: NIfTI, MetaImage, NRRD
 # ct_resample = true                             # a tilted gantry or uneven slices
 # ct_values = "mu"                               # attenuation per mm; or "raw" with ct_raw_slope_per_mm, or "labels"
 # ct_body_only = true                            # table and head holder become air
-# Where the patient lies according to the set-up: x_room = nominal_room_from_ct * x_ct, rigid. The true pose is looked
-# for about it, within the fields' range. The identity puts the CT's origin at the room's, head to +z.
-nominal_room_from_ct = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+# Points of the CT can be read off the pictures of `af-inspect patient-01/ct.nii.gz --pictures pictures`.
 center_ct_mm = [0.0, 0.0, 0.0]                   # middle of the region to register; rotations turn about it
 target_box_ct_mm = [[-30, -30, -30], [30, 30, 30]]  # low and high corner: TRE is the mean over this box
+# Where the patient lies according to the set-up: x_room = nominal_room_from_ct * x_ct, rigid. The true pose is looked
+# for about it, within the fields' range. Without it the landmarks' pose is taken (below); without these, too,
+# center_ct_mm lies at the rig's isocentre, with the patient's axes along the room's: here x left, y back, z head.
+# nominal_room_from_ct = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
 
 # To measure errors, one of these is needed, and with both the fiducials' pose is compared with the stated one:
 # at least three fiducials not on one line, here and in every view in the same order ([] for one that a view hides) ...
@@ -70,7 +72,6 @@ roi_px = [156, 156, 200, 200]
 [[case]]
 name = "patient-02"
 ct = "patient-02/dicom"
-nominal_room_from_ct = [[1, 0, 0, 12.5], [0, 1, 0, 140.0], [0, 0, 1, 230.0], [0, 0, 0, 1]]
 center_ct_mm = [-12.5, -140.0, -230.0]
 target_box_ct_mm = [[-42.5, -170, -260], [17.5, -110, -200]]
 

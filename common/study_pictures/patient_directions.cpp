@@ -36,4 +36,16 @@ EdgeLetters edge_letters(const CameraGeometry& camera, const RigidTransform& roo
           letters(camera.beam_direction())};
 }
 
+void add_letters(const EdgeLetters& letters, const RegionOfInterest& part, PicturePanel& panel) {
+  const double inset = 0.05 * std::max(part.width, part.height);
+  const auto add = [&](double x, double y, const std::string& text) {
+    panel.marks.push_back(
+        {{part.column + x, part.row + y}, PictureMark::Shape::None, text, PictureColor::Yellow});
+  };
+  add(inset, part.height / 2.0, letters.left);
+  add(part.width - inset, part.height / 2.0, letters.right);
+  add(part.width / 2.0, inset, letters.top);
+  add(part.width / 2.0, part.height - inset, letters.bottom);
+}
+
 }  // namespace af

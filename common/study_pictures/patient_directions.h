@@ -4,6 +4,7 @@
 #include <array>
 #include <string>
 
+#include "figures/picture.h"
 #include "geometry/camera_geometry.h"
 #include "geometry/rigid_transform.h"
 
@@ -22,5 +23,8 @@ struct EdgeLetters {
 /// The patient's directions as a camera's picture shows them at a pose: at the left edge stand the
 /// letters of the direction against the columns, at the top of that against the rows.
 EdgeLetters edge_letters(const CameraGeometry& camera, const RigidTransform& room_from_ct);
+
+/// Puts them along the edges of a part of the panel's image.
+void add_letters(const EdgeLetters& letters, const RegionOfInterest& part, PicturePanel& panel);
 
 }  // namespace af

@@ -10,7 +10,6 @@
 #include "field_use/field_coverage.h"
 #include "figures/picture.h"
 #include "files/output_file.h"
-#include "study/ct_keys.h"
 #include "study/landmark_start.h"
 #include "study/xray_reader.h"
 #include "study_pictures/patient_directions.h"
@@ -38,25 +37,11 @@ struct ShrunkView {
   }
 };
 
-ShrunkView shrunk_view(const CameraGeometry& camera) {
-  constexpr int kMostPixels = 320;
+ShrunkView shrunk_view(const CameraGeometry& camera, int most_pixels) {
   const int longest = camera.size_px.maxCoeff();
-  const int factor = std::max(1, (longest + kMostPixels - 1) / kMostPixels);
+  const int factor = std::max(1, (longest + most_pixels - 1) / most_pixels);
   const View whole = View::whole_detector(camera);
   return {factor == 1 ? whole : whole.coarser(factor), factor};
-}
-
-void add_letters(const EdgeLetters& letters, PicturePanel& panel) {
-  const double width = panel.image.width;
-  const double height = panel.image.height;
-  const double inset = 0.05 * std::max(width, height);
-  const auto add = [&](double x, double y, const std::string& text) {
-    panel.marks.push_back({{x, y}, PictureMark::Shape::None, text, PictureColor::Yellow});
-  };
-  add(inset, height / 2.0, letters.left);
-  add(width - inset, height / 2.0, letters.right);
-  add(width / 2.0, inset, letters.top);
-  add(width / 2.0, height - inset, letters.bottom);
 }
 
 void add_region(const StudyView& view, const ShrunkView& shrunk, PicturePanel& panel) {
@@ -202,14 +187,16 @@ void draw_view(const Study& study,
                const StudyView& view,
                const DrrRenderer& caster,
                const std::vector<ShownPose>& poses,
+               int most_pixels,
                const std::string& stem,
                StudyPictures& pictures) {
   const CameraGeometry& camera = study.rig.camera(view.camera);
-  const ShrunkView shrunk = shrunk_view(camera);
+  const ShrunkView shrunk = shrunk_view(camera, most_pixels);
   const ViewXray read = read_view_xray(view, camera);
   const Image2d xray = block_means(read.attenuation, shrunk.factor);
   const std::optional<HeldRays> field = field_of(study_case, view, camera, pictures);
   const EdgeLetters letters = edge_letters(camera, poses.front().room_from_ct);
+  const RegionOfInterest whole = {0, 0, xray.width, xray.height};
   const std::string beam = "beam from " + letters.beam_from + " to " + letters.beam_to;
   std::vector<PicturePanel> panels;
   panels.push_back(
@@ -217,16 +204,22 @@ void draw_view(const Study& study,
                  view,
                  shrunk,
                  "X-ray",
-                 "as the file has it, attenuation; letters of the nominal pose, " + beam +
-                     (read.mask.pixels.empty() ? "" : "; orange: masked") +
+                 "as the file has it, attenuation; letters of the " + poses.front().name + ", " +
+                     beam + (read.mask.pixels.empty() ? "" : "; orange: masked") +
                      (view.landmarks_px.empty() ? "" : "; circles: landmarks as marked")));
-  add_letters(letters, panels.back());
+  add_letters(letters, whole, panels.back());
   add_region(view, shrunk, panels.back());
   panels.back().caption += add_coverage(field, shrunk, poses.front().room_from_ct, panels.back());
   add_landmarks(study_case, view, shrunk, camera, nullptr, panels.back());
   Image2d last_drr;
   for (const ShownPose& pose : poses) {
     last_drr = render_image(caster, pose.room_from_ct, shrunk.view);
+    if (std::ranges::max(last_drr.pixels) <= 0.0f) {
+      const std::string what = "the DRR at the " + pose.name + " is empty: no ray meets the CT";
+      pictures.telltales.push_back("camera " + camera.name + ": " + what);
+      pictures.problems.push_back("case '" + study_case.name + "', camera '" + camera.name +
+                                  "': " + what);
+    }
     const EdgeLetters at_pose = edge_letters(camera, pose.room_from_ct);
     panels.push_back(panel_with(last_drr,
                                 view,
@@ -237,7 +230,7 @@ void draw_view(const Study& study,
                                     (study_case.landmarks_ct_mm.empty()
                                          ? ""
                                          : "; crosses: landmarks where this pose puts them")));
-    add_letters(at_pose, panels.back());
+    add_letters(at_pose, whole, panels.back());
     add_region(view, shrunk, panels.back());
     panels.back().caption += add_coverage(field, shrunk, pose.room_from_ct, panels.back());
     add_landmarks(study_case, view, shrunk, camera, &pose.room_from_ct, panels.back());
@@ -264,25 +257,23 @@ void draw_view(const Study& study,
 
 StudyPictures draw_study_pictures(const Study& study,
                                   const StudyCase& study_case,
-                                  const CtReadOptions& ct_reading,
+                                  const CtVolume& ct,
+                                  int most_pixels,
                                   const std::filesystem::path& folder,
                                   const std::string& stem) {
   StudyPictures pictures;
-  const CtVolume ct = naming_study_line(study_case.places, "ct", [&] {
-    return read_ct(study_case.ct,
-                   ct_reading_in_force(ct_reading, study_case.ct_reading),
-                   &pictures.ct_warnings);
-  });
   const RayCastDrr caster(std::make_shared<const AttenuationVolume>(ct, AttenuationModel()));
   std::vector<ShownPose> poses = {{"nominal pose", study_case.nominal_room_from_ct}};
   if (has_landmarks(study_case)) {
     const LandmarkPose pose = landmark_pose(study, study_case);
+    if (pose.room_from_ct.isApprox(study_case.nominal_room_from_ct)) poses.clear();
     poses.push_back({"pose of the landmarks", pose.room_from_ct});
     pictures.facts.push_back(residuals_text(pose, study_case));
   }
   std::vector<CameraGeometry> cameras;
   for (const StudyView& view : study_case.views) {
-    draw_view(study, study_case, view, caster, poses, (folder / stem).string(), pictures);
+    draw_view(
+        study, study_case, view, caster, poses, most_pixels, (folder / stem).string(), pictures);
     cameras.push_back(study.rig.camera(view.camera));
   }
   const std::filesystem::path path = folder / (stem + "-room.png");

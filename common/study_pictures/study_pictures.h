@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "drr/drr_renderer.h"
-#include "image_files/ct_reader.h"
 #include "study/study_file.h"
+#include "volume/ct_volume.h"
 
 namespace af {
 
@@ -20,17 +20,18 @@ struct StudyPictures {
   std::vector<std::string> facts;  ///< "camera A: left edge R, ...", and what its field holds
   /// Mirrored cameras, X-rays that look flipped or scaled, fields that miss rays.
   std::vector<std::string> telltales;
-  std::vector<std::string> ct_warnings;  ///< of reading the CT
+  std::vector<std::string> problems;  ///< views at which a DRR is empty
 };
 
 /// Draws STEM-CAMERA.png for each view of a case (X-ray and DRRs at the nominal pose and, where the
 /// case has landmarks, at the pose that they give; patient letters at the edges, region, landmarks,
 /// the limit of the field's cover where the field exists) and STEM-room.png (sources, detectors and
-/// CT box). DRRs are cast through the CT at a few hundred pixels. Nothing is ever
-/// flipped. Errors as of reading the CT, the X-rays and the fields.
+/// CT box). DRRs are cast through the CT. Detectors with more than `most_pixels` on a side are
+/// shrunk. Nothing is ever flipped. Errors as of reading the X-rays and the fields.
 StudyPictures draw_study_pictures(const Study& study,
                                   const StudyCase& study_case,
-                                  const CtReadOptions& ct_reading,
+                                  const CtVolume& ct,
+                                  int most_pixels,
                                   const std::filesystem::path& folder,
                                   const std::string& stem);
 

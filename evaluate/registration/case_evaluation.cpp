@@ -35,6 +35,7 @@
 #include "run/resumable_items.h"
 #include "run/stop_request.h"
 #include "run/terminal.h"
+#include "study/node_ct.h"
 #include "study/pose_context.h"
 #include "study_pictures/study_pictures.h"
 #include "text/options_toml.h"
@@ -453,9 +454,12 @@ void draw_setting(const RegistrationStudyOptions& options,
                   const StudyCase& study_case,
                   CaseEvaluation& evaluation) {
   const WorkNote note("drawing the setting of case " + study_case.name, WorkNote::Kind::Phase);
+  // A report holds the pictures of all cases.
+  constexpr int kMostPixels = 320;
   const StudyPictures pictures = draw_study_pictures(study,
                                                      study_case,
-                                                     options.ct,
+                                                     read_case_ct(study_case, options.ct),
+                                                     kMostPixels,
                                                      options.output_folder,
                                                      file_name_part(study_case.name) + "-setting");
   // One of each view, then the room.

@@ -118,6 +118,18 @@ TEST(AfInspect, WarnsOfThickSlicesAndOfALeftHandedGrid) {
   EXPECT_THAT(warnings, Contains(HasSubstr("left-handed")));
 }
 
+TEST(AfInspect, SaysOnceThatValuesAreNoHu) {
+  const ScratchFolder folder;
+  CtVolume raw = test::asymmetric_ct(test::small_grid());
+  std::vector<std::int16_t> values(raw.hu.view().begin(), raw.hu.view().end());
+  for (std::int16_t& value : values) value = static_cast<std::int16_t>(value + 1024);
+  raw.hu = SharedArray<std::int16_t>(std::move(values));
+  write_ct(raw, folder / "raw.mha");
+  const auto warnings =
+      inspect_json((folder / "raw.mha").string())["warnings"].get<std::vector<std::string>>();
+  EXPECT_THAT(warnings, testing::ElementsAre(HasSubstr("do not look like HU")));
+}
+
 TEST(AfInspect, RefusesADicomFolderWithTwoSeriesUntilOneIsChosen) {
   const ScratchFolder folder;
   const CtVolume ct = test::asymmetric_ct(test::small_grid());
@@ -301,6 +313,55 @@ TEST(AfInspect, TakesAStudyWhoseFieldsAreStillToBeMade) {
   EXPECT_EQ(entry["ok"], true);
   ASSERT_EQ(entry["warnings"].size(), 1u);
   EXPECT_THAT(entry["warnings"][0].get<std::string>(), HasSubstr("LAT.af.h5 does not exist yet"));
+}
+
+TEST(AfInspect, RefusesAStudyWhoseTargetLiesOutsideTheCt) {
+  const ScratchFolder folder;
+  test::write_small_study(folder.path());
+  Study study = read_study(folder / "study.toml");
+  study.cases[0].target_box_ct = {{-20, -20, 60}, {20, 20, 80}};
+  study.cases[0].nominal_room_from_ct.translation().z() = -70;
+  write_text_file(folder / "study.toml", study_to_toml(study, folder.path()));
+  for (const char* more : {"", " --pictures "}) {
+    const std::string pictures = *more == '\0' ? "" : more + (folder / "pictures").string();
+    const test::ProgramRun run = inspect((folder / "study.toml").string() + pictures);
+    EXPECT_EQ(run.exit_code, 3) << run.output;
+    EXPECT_THAT(run.output, HasSubstr("case[0].target_box_ct_mm: [[-20.0, -20.0, 60.0], "));
+    EXPECT_THAT(run.output, HasSubstr("z -48.0 to 48.0 mm"));
+  }
+}
+
+TEST(AfInspect, DrawsPicturesOfACtAndOfAStudy) {
+  const ScratchFolder folder;
+  test::write_small_study(folder.path());
+  const std::string to = " --pictures " + (folder / "pictures").string();
+  ASSERT_EQ(inspect((folder / "ct.nii.gz").string() + to).exit_code, 0);
+  EXPECT_TRUE(fs::exists(folder / "pictures" / "ct-ct.png"));
+  const test::ProgramRun run = inspect((folder / "study.toml").string() + to);
+  ASSERT_EQ(run.exit_code, 0) << run.output;
+  EXPECT_THAT(run.output, testing::Not(HasSubstr("LOOK")));
+  for (const char* name : {"AP", "LAT", "room", "ct", "ct-axial"})
+    EXPECT_TRUE(fs::exists(folder / "pictures" / ("ellipsoids-" + std::string(name) + ".png")));
+}
+
+// The target and the CT's air are in the beam, its anatomy is 400 mm beside it.
+TEST(AfInspect, RefusesAnEmptyDrrByNameAndDrawsIt) {
+  const ScratchFolder folder;
+  test::write_small_study(folder.path());
+  CtVolume ct;
+  ct.grid.size = {60, 20, 20};
+  ct.grid.spacing_mm = Eigen::Vector3d::Constant(10.0);
+  ct.grid.origin_mm = {-95.0, -95.0, -95.0};
+  std::vector<std::int16_t> hu(ct.grid.voxel_count(), -1000);
+  for (std::size_t i = 55; i < hu.size(); i += 60) hu[i] = 500;
+  ct.hu = SharedArray<std::int16_t>(std::move(hu));
+  write_ct(ct, folder / "ct.nii.gz");
+  const test::ProgramRun run =
+      inspect((folder / "study.toml").string() + " --pictures " + (folder / "pictures").string());
+  EXPECT_EQ(run.exit_code, 3) << run.output;
+  EXPECT_THAT(run.output, HasSubstr("LOOK: camera AP: the DRR at the nominal pose is empty"));
+  EXPECT_THAT(run.output, HasSubstr("case 'ellipsoids', camera 'AP': the DRR at the nominal pose"));
+  EXPECT_TRUE(fs::exists(folder / "pictures" / "ellipsoids-room.png"));
 }
 
 TEST(AfInspect, ListsAnglesOfCamerasThatLookAtTheSamePatient) {

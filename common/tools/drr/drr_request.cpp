@@ -514,6 +514,9 @@ void run_drr(const DrrOptions& options, const Communicator& world) {
   require_room(poses.size(), scene.view, options.output);
   const std::vector<Image2d> drrs =
       render_poses(*scene.renderer, scene.view, poses, *scene.pool, scene.note);
+  for (std::size_t i = 0; i < drrs.size(); ++i)
+    if (std::ranges::all_of(drrs[i].pixels, [](float value) { return value == 0.0f; }))
+      warn(world, "pose " + std::to_string(i) + ": the DRR is empty: no ray meets the CT");
   std::cout << write_drrs(drrs, scene.view, options) << '\n';
 }
 

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <optional>
 #include <set>
 
 #include "camera_files/camera_formats.h"
@@ -12,6 +11,7 @@
 #include "image_files/ct_reader.h"
 #include "image_files/image_file.h"
 #include "pose_files/pose_file.h"
+#include "study/node_ct.h"
 #include "study/rig_file.h"
 #include "study/study_file.h"
 #include "study/xray_reader.h"
@@ -78,23 +78,17 @@ bool have_common_case(const Study& study, const std::string& camera, const std::
   });
 }
 
-void require_existing(const fs::path& path) {
-  if (!fs::exists(path)) throw FileError(path.string(), "does not exist");
-}
-
-/// Whether the field of a view is of the case's CT, which is read for the first of them, and what
-/// it covers of the rays that registrations look at, about the case's nominal pose: those of twice
-/// its region.
+/// Whether the field of a view is of the case's CT, and what it covers of the rays that
+/// registrations look at, about the case's nominal pose: those of twice its region.
 void describe_field(const StudyCase& study_case,
                     const StudyView& view,
                     const CameraGeometry& camera,
-                    std::optional<CtIdentity>& ct,
+                    const CtIdentity& ct,
                     ordered_json& json,
                     std::vector<std::string>& warnings) {
   try {
     const HeldRays field = read_held_rays(*view.field);
-    if (!ct) ct = identity_of(read_ct(study_case.ct, study_case.ct_reading));
-    require_same_ct(view.field->string(), *ct, study_case.ct.string(), field.identity.ct);
+    require_same_ct(view.field->string(), ct, study_case.ct.string(), field.identity.ct);
     const View needed = View{camera, view.roi}.scaled(kWidestRegionScale);
     const ViewReach reach = field.coverage.reach(needed, study_case.frame(), field.identity.range);
     json["field_camera"] = reach.distance;
@@ -112,7 +106,7 @@ void describe_field(const StudyCase& study_case,
 ordered_json view_json(const StudyCase& study_case,
                        const StudyView& view,
                        const CameraRig& rig,
-                       std::optional<CtIdentity>& ct,
+                       const CtIdentity& ct,
                        std::vector<std::string>& warnings) {
   ordered_json json;
   json["camera"] = view.camera;
@@ -141,19 +135,19 @@ ordered_json view_json(const StudyCase& study_case,
 
 ordered_json case_json(const StudyCase& study_case,
                        const CameraRig& rig,
+                       const CtReadOptions& ct_reading,
                        std::vector<std::string>& warnings) {
   ordered_json json;
   json["name"] = study_case.name;
   json["ct"] = study_case.ct.string();
   if (const std::string reading = study_case.ct_reading.text(); !reading.empty())
     json["ct_reading"] = reading;
-  naming_study_line(study_case.places, "ct", [&] { require_existing(study_case.ct); });
+  const CtIdentity ct = identity_of(read_case_ct(study_case, ct_reading, &warnings));
   json["center_ct_mm"] = vector_json(study_case.center_ct_mm);
   json["target_box_ct_mm"] = {vector_json(study_case.target_box_ct.low_mm),
                               vector_json(study_case.target_box_ct.high_mm)};
   json["fiducials"] = study_case.fiducials_ct_mm.size();
   json["has_gold_pose"] = study_case.gold_room_from_ct.has_value();
-  std::optional<CtIdentity> ct;
   for (const StudyView& view : study_case.views)
     json["views"].push_back(view_json(study_case, view, rig, ct, warnings));
   return json;
@@ -252,14 +246,15 @@ void inspect_camera_file(const fs::path& path, Inspection& inspection) {
   for (const auto& [key, value] : rig.items()) inspection.facts[key] = value;
 }
 
-void inspect_study(const fs::path& path, Inspection& inspection) {
+void inspect_study(const fs::path& path, const CtReadOptions& options, Inspection& inspection) {
   inspection.kind = "study";
   const Study study = read_study(path, &inspection.warnings);
   inspection.facts["rig"] = rig_json(study.rig, [&](const auto& camera, const auto& other) {
     return have_common_case(study, camera, other);
   });
   for (const StudyCase& study_case : study.cases)
-    inspection.facts["cases"].push_back(case_json(study_case, study.rig, inspection.warnings));
+    inspection.facts["cases"].push_back(
+        case_json(study_case, study.rig, options, inspection.warnings));
 }
 
 void inspect_pose(const fs::path& path, Inspection& inspection) {

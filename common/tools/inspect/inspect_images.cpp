@@ -15,6 +15,7 @@
 #include "image_files/itk_image_io.h"
 #include "image_files/stored_image.h"
 #include "run/input_identity.h"
+#include "study/target_place.h"
 #include "tools/inspect/inspect_kinds.h"
 
 namespace af {
@@ -25,6 +26,7 @@ using nlohmann::ordered_json;
 namespace {
 
 constexpr int kAirBelowHu = -900;
+constexpr int kNoAirFromHu = -200;
 constexpr int kTissueFromHu = -300;
 constexpr int kBoneFromHu = 300;
 /// Slices this much thicker than pixels are wide make lateral DRRs coarse.
@@ -75,22 +77,8 @@ std::string patient_letters(const Eigen::Vector3d& direction) {
   return letters;
 }
 
-/// Outer corners of the voxels, as an axis-aligned box in LPS.
-std::array<Eigen::Vector3d, 2> outer_box(const CtGrid& grid) {
-  Eigen::Vector3d low = Eigen::Vector3d::Constant(1e300);
-  Eigen::Vector3d high = -low;
-  for (unsigned corner = 0; corner < 8; ++corner) {
-    Eigen::Vector3d index;
-    for (unsigned axis = 0; axis < 3; ++axis)
-      index[axis] = (corner >> axis & 1u) != 0 ? grid.size[axis] - 0.5 : -0.5;
-    low = low.cwiseMin(grid.point_mm(index));
-    high = high.cwiseMax(grid.point_mm(index));
-  }
-  return {low, high};
-}
-
 ordered_json grid_json(const CtGrid& grid) {
-  const auto [low, high] = outer_box(grid);
+  const auto [low, high] = bounding_box(grid);
   ordered_json json = to_json(grid);
   json["axes_point_to"] = {patient_letters(grid.direction.col(0)),
                            patient_letters(grid.direction.col(1)),
@@ -146,7 +134,9 @@ void warn_of_ct(const CtVolume& ct, const HuStatistics& hu, Inspection& inspecti
   if (ct.grid.direction.determinant() < 0.0)
     inspection.warnings.push_back(
         "left-handed voxel order: read correctly, but check left and right in a DRR");
-  if (hu.share(kAirBelowHu, 32768) > 0.999 && hu.quantile(0.0) < -200)
+  // Values without any air are no HU, as read_ct() says; every face would count as tissue.
+  if (hu.quantile(0.0) >= kNoAirFromHu) return;
+  if (hu.share(kAirBelowHu, 32768) > 0.999)
     inspection.warnings.push_back("almost no air: cropped to the body?");
   warn_of_cut_body(ct, inspection);
 }

@@ -22,7 +22,9 @@ void inspect_field(const std::filesystem::path& path,
                    Inspection& inspection);
 void inspect_rig(const std::string& name_or_path, Inspection& inspection);
 void inspect_camera_file(const std::filesystem::path& path, Inspection& inspection);
-void inspect_study(const std::filesystem::path& path, Inspection& inspection);
+void inspect_study(const std::filesystem::path& path,
+                   const CtReadOptions& options,
+                   Inspection& inspection);
 void inspect_pose(const std::filesystem::path& path, Inspection& inspection);
 void inspect_csv(const std::filesystem::path& path, Inspection& inspection);
 void inspect_json(const std::filesystem::path& path, Inspection& inspection);

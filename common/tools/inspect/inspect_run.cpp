@@ -153,7 +153,8 @@ void InspectOptions::describe(Fields& field) {
   field("pictures",
         pictures,
         "Of studies: folder for pictures of each view (X-ray, DRRs at the nominal pose and at that "
-        "of the landmarks, with the patient's directions) and of the room")
+        "of the landmarks, with the patient's directions), of the room and of the CT; of a CT: for "
+        "pictures of it with its coordinates in mm (LPS), to read off points")
       .excludes({"--json", "--list-views", "--list-inputs", "--rig-from", "--pose-to"});
   field.part(poses);
   field("output",
@@ -191,10 +192,12 @@ void run_inspect(const InspectOptions& options, const Communicator& world) {
   }
   if (!options.pictures.empty()) {
     for (const std::string& path : options.paths) {
-      const std::string text = all_or_none(world, [&] {
-        return world.is_root() ? draw_pictures(path, options.ct, options.pictures) : std::string();
+      all_or_none(world, [&] {
+        if (!world.is_root()) return;
+        const DrawnPictures drawn = draw_pictures(path, options.ct, options.pictures);
+        std::cout << drawn.text << std::flush;
+        throw_if_any(drawn.problems);
       });
-      if (world.is_root()) std::cout << text;
     }
     return;
   }

@@ -18,8 +18,10 @@
 #include "pose_files/itk_transform.h"
 #include "pose_files/pose_file.h"
 #include "run/progress_journal.h"
+#include "study/node_ct.h"
 #include "study/rig_file.h"
 #include "study/study_file.h"
+#include "study_pictures/ct_pictures.h"
 #include "study_pictures/study_pictures.h"
 #include "tools/inspect/inspect_kinds.h"
 
@@ -29,6 +31,9 @@ namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
 namespace {
+
+/// Detectors with more pixels on a side are drawn smaller.
+constexpr int kMostDetectorPixels = 1200;
 
 constexpr std::string_view kHdf5Mark = "\x89HDF\r\n\x1a\n";
 
@@ -83,11 +88,11 @@ bool is_sixteen_numbers(const std::string& text) {
   return words.eof() && count == 16;
 }
 
-void inspect_text(const fs::path& path, Inspection& inspection) {
+void inspect_text(const fs::path& path, const CtReadOptions& options, Inspection& inspection) {
   constexpr std::size_t kTextBytes = 1u << 18;
   const std::string text = first_bytes(path, kTextBytes);
   if (!is_text(text)) throw not_recognised(path);
-  if (has_line(text, "[[case]]")) return inspect_study(path, inspection);
+  if (has_line(text, "[[case]]")) return inspect_study(path, options, inspection);
   if (has_line(text, "[[camera]]")) return inspect_rig(path.string(), inspection);
   const std::size_t first = text.find_first_not_of(" \t\r\n");
   if (first != std::string::npos && text[first] == '{') return inspect_json(path, inspection);
@@ -119,7 +124,7 @@ void inspect_file(const fs::path& path,
     return inspect_pose(path, inspection);
   if (sniff_image_format(path)) return inspect_image(path, options, inspection);
   if (states_cameras(path)) return inspect_camera_file(path, inspection);
-  inspect_text(path, inspection);
+  inspect_text(path, options, inspection);
 }
 
 /// The files of a folder that mean something to this project, in the order of their names.
@@ -173,6 +178,13 @@ void inspect_anything(const fs::path& path,
   if (std::find(rigs.begin(), rigs.end(), path.string()) != rigs.end())
     return inspect_rig(path.string(), inspection);
   throw FileError(path.string(), fs::exists(path, error) ? "is no regular file" : "does not exist");
+}
+
+/// The name of a CT's file or folder without endings: "ct" of ct.nii.gz.
+std::string picture_stem(const fs::path& path) {
+  const fs::path name = (path / "").parent_path().filename();
+  const std::string text = name.string();
+  return file_name_part(text.substr(0, text.find('.', 1)));
 }
 
 bool is_short_list(const ordered_json& json) {
@@ -295,22 +307,37 @@ std::string to_text(const Inspection& inspection) {
   return text_at(inspection, "");
 }
 
-std::string draw_pictures(const fs::path& study_path,
-                          const CtReadOptions& ct_reading,
-                          const fs::path& folder) {
-  const Study study = read_study(study_path);
+DrawnPictures draw_pictures(const fs::path& study_or_ct,
+                            const CtReadOptions& ct_reading,
+                            const fs::path& folder) {
+  DrawnPictures drawn;
+  std::error_code error;
   const OutputLock lock = make_output_folder(folder);
-  std::string text;
-  for (const StudyCase& study_case : study.cases) {
-    const StudyPictures pictures =
-        draw_study_pictures(study, study_case, ct_reading, folder, file_name_part(study_case.name));
-    text += "case " + study_case.name + "\n";
-    for (const std::string& fact : pictures.facts) text += "  " + indented(fact, "  ") + "\n";
-    for (const std::string& warning : pictures.ct_warnings) text += "  warning: " + warning + "\n";
-    for (const std::string& telltale : pictures.telltales) text += "  LOOK: " + telltale + "\n";
-    for (const fs::path& file : pictures.files) text += "  " + file.string() + "\n";
+  if (fs::is_directory(study_or_ct, error) || sniff_image_format(study_or_ct)) {
+    const CtVolume ct = read_ct(study_or_ct, ct_reading);
+    for (const fs::path& file : draw_ct_pictures(ct, {}, folder, picture_stem(study_or_ct)))
+      drawn.text += file.string() + "\n";
+    return drawn;
   }
-  return text;
+  const Study study = read_study(study_or_ct);
+  for (const StudyCase& study_case : study.cases) {
+    const std::string stem = file_name_part(study_case.name);
+    std::vector<std::string> warnings;
+    const CtVolume ct = read_case_ct(study_case, ct_reading, &warnings);
+    StudyPictures pictures =
+        draw_study_pictures(study, study_case, ct, kMostDetectorPixels, folder, stem);
+    for (const fs::path& file :
+         draw_ct_pictures(ct, {study_case.target_box_ct, study_case.landmarks_ct_mm}, folder, stem))
+      pictures.files.push_back(file);
+    drawn.text += "case " + study_case.name + "\n";
+    for (const std::string& fact : pictures.facts) drawn.text += "  " + indented(fact, "  ") + "\n";
+    for (const std::string& warning : warnings) drawn.text += "  warning: " + warning + "\n";
+    for (const std::string& telltale : pictures.telltales)
+      drawn.text += "  LOOK: " + telltale + "\n";
+    for (const fs::path& file : pictures.files) drawn.text += "  " + file.string() + "\n";
+    drawn.problems.insert(drawn.problems.end(), pictures.problems.begin(), pictures.problems.end());
+  }
+  return drawn;
 }
 
 std::string view_lines(const fs::path& study_path) {

@@ -38,12 +38,18 @@ nlohmann::ordered_json to_json(const Inspection& inspection);
 /// For people: one fact per line.
 std::string to_text(const Inspection& inspection);
 
-/// Draws the pictures of every case of a study (draw_study_pictures()) into a folder, which is
-/// made; returns what they show and the tell-tales, for people. Throws as read_study() and reading
-/// what the study names.
-std::string draw_pictures(const std::filesystem::path& study_path,
-                          const CtReadOptions& ct_reading,
-                          const std::filesystem::path& folder);
+/// What was drawn, for people, and what of it cannot be right.
+struct DrawnPictures {
+  std::string text;
+  std::vector<std::string> problems;
+};
+
+/// Draws the pictures of every case of a study (draw_study_pictures()), or of a CT
+/// (draw_ct_pictures()), into a folder, which is made. Throws as read_study() and reading what the
+/// study names, or as read_ct().
+DrawnPictures draw_pictures(const std::filesystem::path& study_or_ct,
+                            const CtReadOptions& ct_reading,
+                            const std::filesystem::path& folder);
 
 /// For scripts: one line per view of a study, "case<tab>camera". Throws as read_study().
 std::string view_lines(const std::filesystem::path& study_path);

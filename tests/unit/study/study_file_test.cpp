@@ -9,8 +9,10 @@
 
 #include "base/error.h"
 #include "study/ct_keys.h"
+#include "study/landmark_start.h"
 #include "study/rig_file.h"
 #include "study/study_template.h"
+#include "study/target_place.h"
 #include "support/io_checks.h"
 #include "text/options_toml.h"
 
@@ -143,6 +145,7 @@ TEST_F(StudyFile, WarningsOfTheRigReachTheCaller) {
   EXPECT_TRUE(warnings.empty());
   CameraRig mirrored = read_rig("treatment-room");
   CameraGeometry& camera = mirrored.cameras.front();
+  camera.detector_origin_point = camera.detector_point(0.0, camera.size_px.y() - 1.0);
   camera.row_direction = -camera.row_direction;
   std::ofstream(folder() / "rig.toml") << rig_to_toml(mirrored);
   read_study(path(), &warnings);
@@ -347,11 +350,74 @@ TEST_F(StudyFile, UnknownKeysAreRefusedWithTheNearestName) {
 TEST_F(StudyFile, MissingPartsAreAllNamed) {
   const std::string message =
       message_of<InputError>([&] { read("rig = \"treatment-room\"\n[[case]]\nname = \"x\"\n"); });
-  for (const char* key : {"ct", "nominal_room_from_ct", "center_ct_mm", "target_box_ct_mm", "view"})
+  for (const char* key : {"ct", "center_ct_mm", "target_box_ct_mm", "view"})
     EXPECT_THAT(message, HasSubstr(path() + ":2: case[0]." + key + " is missing"));
   EXPECT_THAT(message_of<InputError>([&] { read("rig = \"treatment-room\"\n"); }),
               HasSubstr("case is missing"));
   EXPECT_THAT(message_of<InputError>([&] { read("[[case]]\n"); }), HasSubstr("rig is missing"));
+}
+
+TEST_F(StudyFile, WithoutANominalPoseTheCentreLiesAtTheIsocentre) {
+  CameraRig rig = read_rig("treatment-room");
+  rig.isocenter_point = {5.0, -6.0, 7.0};
+  std::ofstream(folder() / "rig.toml") << rig_to_toml(rig);
+  const std::regex nominal("nominal_room_from_ct = [^\n]*\n");
+  const std::string text = replaced(kGoodStudy, "treatment-room", "rig.toml");
+  const StudyCase study_case = read(std::regex_replace(text, nominal, "")).find_case("");
+  EXPECT_EQ(study_case.nominal_room_from_ct * study_case.center_ct_mm, rig.isocenter_point);
+  EXPECT_EQ(study_case.nominal_room_from_ct.linear(), Eigen::Matrix3d::Identity());
+}
+
+TEST_F(StudyFile, ANominalPoseThatShowsNoneOfTheTargetIsRefused) {
+  EXPECT_THAT(refusal("[[1,0,0,10]", "[[1,0,0,900]"),
+              AllOf(HasSubstr(path() + ":5: case[0].nominal_room_from_ct = "),
+                    HasSubstr("in the beam of camera 'A', but it is projected to columns"),
+                    HasSubstr("without this key center_ct_mm is put at the isocentre")));
+  const CameraGeometry camera = read_rig("treatment-room").camera("A");
+  StudyCase behind = read(kGoodStudy).find_case("");
+  behind.nominal_room_from_ct.translation() = camera.source_point - 500.0 * camera.beam_direction();
+  EXPECT_THAT(beam_problem(behind, camera), HasSubstr("but it is behind the source"));
+  // A part in the beam is enough: a corner of the box at the detector's edge.
+  StudyCase at_edge = read(kGoodStudy).find_case("");
+  at_edge.nominal_room_from_ct = RigidTransform::Identity();
+  at_edge.nominal_room_from_ct.translation() =
+      camera.detector_point(0.0, 0.0) - at_edge.target_box_ct.high_mm;
+  EXPECT_EQ(beam_problem(at_edge, camera), "");
+}
+
+TEST_F(StudyFile, ATargetBoxOutsideTheCtIsRefused) {
+  const StudyCase study_case = read(kGoodStudy).find_case("");
+  CtGrid grid;
+  grid.size = {100, 90, 210};
+  grid.spacing_mm = {4.0, 4.0, 2.0};
+  grid.origin_mm = {-200.0, -180.0, -848.0};
+  EXPECT_THAT(message_of<InputError>([&] { require_target_in_ct(study_case, grid); }),
+              AllOf(HasSubstr(path() + ":7: case[0].target_box_ct_mm: [[-30.0, -31.0, -32.0], "),
+                    HasSubstr("must reach into the CT, which spans"),
+                    HasSubstr("z -849.0 to -429.0 mm")));
+  // A corner of the CT within the box, whatever the order and direction of the voxels.
+  for (const double turn_deg : {0.0, 30.0, 90.0, 180.0}) {
+    grid.direction = Eigen::AngleAxisd(turn_deg * kRadPerDeg, Vector3d::UnitZ()).toRotationMatrix();
+    grid.origin_mm.setZero();
+    grid.origin_mm = Vector3d(29.0, 30.0, 31.0) - grid.point_mm({99.0, 89.0, 209.0});
+    EXPECT_NO_THROW(require_target_in_ct(study_case, grid)) << turn_deg;
+  }
+}
+
+TEST(ResidualsText, SaysWhetherTheMarksAgree) {
+  StudyCase study_case;
+  study_case.views.resize(2);
+  study_case.views[0].camera = "A";
+  study_case.views[1].camera = "B";
+  LandmarkPose pose;
+  pose.residuals = {{0, 0, 3.0, 1.0}, {2, 1, 60.0, 18.0}};
+  const auto text = [&](double rms_mm) {
+    pose.rms_mm = rms_mm;
+    return residuals_text(pose, study_case);
+  };
+  EXPECT_THAT(text(2.5), HasSubstr("good: within the 2.5 mm that count as a successful"));
+  EXPECT_THAT(text(2.6), HasSubstr("rough: beyond the 2.5 mm"));
+  EXPECT_THAT(text(10.1), AllOf(HasSubstr("bad: beyond the 10 mm"), HasSubstr("B #3 first")));
 }
 
 TEST_F(StudyFile, WithoutARegionTheWholeDetectorCounts) {

@@ -4,6 +4,7 @@
 
 #include "base/hash_random.h"
 #include "study/rig_file.h"
+#include "study_pictures/ct_pictures.h"
 #include "study_pictures/patient_directions.h"
 #include "study_pictures/picture_match.h"
 #include "study_pictures/room_sketch.h"
@@ -157,6 +158,57 @@ TEST(RoomSketch, ShowsEveryCameraWithinItsPaper) {
     for (const PictureMark& mark : panel.marks) {
       EXPECT_GE(std::min(mark.place[0], mark.place[1]), 0.0);
       EXPECT_LE(std::max(mark.place[0], mark.place[1]), panel.image.width);
+    }
+  }
+}
+
+/// The middle of the brightest pixels of a panel; its coordinates stand on white.
+std::array<double, 2> brightest_place(const PicturePanel& panel) {
+  float highest = -1e9F;
+  for (const float value : panel.image.pixels)
+    if (value < 1e6F) highest = std::max(highest, value);
+  std::array<double, 3> sums = {0.0, 0.0, 0.0};
+  for (int row = 0; row < panel.image.height; ++row)
+    for (int column = 0; column < panel.image.width; ++column)
+      if (const float value = panel.image.at(column, row); value < 1e6F && value > highest - 1.0F)
+        sums = {sums[0] + column, sums[1] + row, sums[2] + 1.0};
+  return {sums[0] / sums[2], sums[1] / sums[2]};
+}
+
+// Axial from the feet, coronal from the front, sagittal from the patient's left: what lies left, at
+// the back and towards the head is at the right, below and on top. A marked point lies on what the
+// CT has there, whatever the order of its voxels.
+TEST(CtOverview, ShowsPointsOfTheCtWhereRadiographersExpectThem) {
+  const Vector3d point(30.0, 20.0, 10.0);
+  for (const Vector3d& signs : {Vector3d(1, 1, 1), Vector3d(-1, -1, 1), Vector3d(1, -1, -1)}) {
+    CtVolume ct;
+    ct.grid.size = {50, 40, 30};
+    ct.grid.spacing_mm = {2.0, 2.5, 3.0};
+    ct.grid.direction = signs.asDiagonal();
+    ct.grid.origin_mm = -ct.grid.center_mm();
+    std::vector<std::int16_t> hu(ct.grid.voxel_count(), -1000);
+    const Vector3d index = ct.grid.index_of(point);
+    const auto at = [&](int axis) { return static_cast<std::size_t>(std::lround(index[axis])); };
+    hu[at(0) + 50 * (at(1) + 40 * at(2))] = 1000;
+    ct.hu = SharedArray<std::int16_t>(std::move(hu));
+    const std::vector<PicturePanel> panels =
+        ct_overview(ct, {CtBox{point - Vector3d::Ones(), point + Vector3d::Ones()}, {point}});
+    ASSERT_EQ(panels.size(), 6U);
+    const std::array<const char*, 3> letters = {"RLAP", "RLHF", "APHF"};
+    const std::array<bool, 3> is_below = {true, false, false};
+    for (std::size_t i = 0; i < panels.size(); ++i) {
+      const PicturePanel& panel = panels[i];
+      std::string found;
+      for (const PictureMark& mark : panel.marks) {
+        if (mark.shape == PictureMark::Shape::None) found += mark.text;
+        if (mark.shape != PictureMark::Shape::Cross) continue;
+        // The nearest voxel: half of 3 mm at 5.6 px per mm.
+        EXPECT_NEAR(mark.place[0], brightest_place(panel)[0], 8.5) << i;
+        EXPECT_NEAR(mark.place[1], brightest_place(panel)[1], 8.5) << i;
+        EXPECT_GT(mark.place[0], panel.image.width / 2.0) << i;
+        EXPECT_EQ(mark.place[1] > panel.image.height / 2.0, is_below[i % 3]) << i;
+      }
+      EXPECT_EQ(found, letters[i % 3]);
     }
   }
 }
