@@ -9,6 +9,7 @@ import os
 import re
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 STUDY = Path(os.environ["AF_LIBRARY_STUDY"])
@@ -55,6 +56,21 @@ def register_with_torch(example):
     expect(number_in(output, r"TRE ([\d.]+) mm in") < 1.0, output)
 
 
+def register_a_phantom(example):
+    code = example.read_text(encoding="utf-8").split("\n", 1)[1]
+    readme = (Path(sys.argv[1]).parent.parent / "README.md").read_text(encoding="utf-8")
+    expect(f"```python\n{code}```" in readme, f"README.md does not quote {example}")
+    command = re.search(r"^af-simulate .*$", readme, re.MULTILINE).group().split()
+    program = Path(os.environ["AF_PROGRAMS"], command[0])
+    with tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)
+        subprocess.run([program, *command[1:]], check=True, capture_output=True)
+        output = output_of(example)
+        pixels = Path("registered.pgm").read_bytes()
+    expect(f"It prints `{output.strip()}`" in readme, output)
+    expect(pixels.startswith(b"P5 768 256 255\n") and len(pixels) == 15 + 768 * 256, output)
+
+
 def evaluate_results(example):
     output = output_of(example, STUDY / "several" / "registrations.csv")
     expect("2 registrations of 1 cases" in output and "field: 2 of 2 succeed" in output, output)
@@ -63,7 +79,12 @@ def evaluate_results(example):
 if __name__ == "__main__":
     check = {
         function.__name__: function
-        for function in (look_up_and_compare, register_with_torch, evaluate_results)
+        for function in (
+            look_up_and_compare,
+            register_with_torch,
+            register_a_phantom,
+            evaluate_results,
+        )
     }[sys.argv[2]]
     check(Path(sys.argv[1], sys.argv[2] + ".py"))
     print(f"{sys.argv[2]}: runs and says what it should")
