@@ -40,7 +40,7 @@ std::filesystem::path field_path_of(const StudyCase& study_case,
   if (view.field.has_value()) return *view.field;
   throw InputError("case '" + study_case.name + "', view '" + view.camera +
                    "': field = none: give --field " + view.camera +
-                   "=FIELD.h5, or the key `field` in the study, or --renderer raycast");
+                   "=FIELD.h5, or the key `field` in the study, or --renderer=raycast");
 }
 
 void require_known_field_cameras(const StudyCase& study_case, const CaseLoadOptions& options) {
@@ -167,13 +167,38 @@ MotionRange shared_box(const MotionRange& range, const Communicator& communicato
   return {high.rotation_rad.x(), high.translation_mm.x()};
 }
 
+/// The views' camera that a field was made for; none: another one.
+const CameraGeometry* camera_of_field(const FieldIdentity& field,
+                                      const std::vector<RegistrationView>& views) {
+  for (const RegistrationView& view : views)
+    if (camera_distance(view.view.camera, field.camera).is_none()) return &view.view.camera;
+  return nullptr;
+}
+
+[[noreturn]] void refuse_rays(const OpenedField& opened,
+                              const std::string& camera,
+                              const ViewReach& reach,
+                              const std::vector<RegistrationView>& views) {
+  const std::string path = opened.path().string();
+  if (const CameraGeometry* other = camera_of_field(opened.identity(), views);
+      other != nullptr && other->name != camera)
+    throw FileError(
+        path, "this is the field of camera '" + other->name + "', not of camera '" + camera + "'");
+  throw FileError(path,
+                  "camera '" + camera + "' of the field",
+                  "one that holds all rays of twice the study's region at the nominal pose",
+                  std::to_string(reach.held) + " of " + std::to_string(reach.rays) +
+                      " rays; the study's has " + reach.distance);
+}
+
 /// Collective. Sets the poses that a field covers for the view's camera and returns a note about
 /// them. The field's motion range holds for its own camera only; for another camera, or an atlas,
 /// its rays decide.
 std::string limit_to_rays(const OpenedField& opened,
-                          const PoseFrame& nominal,
+                          const RegistrationProblem& problem,
                           const Communicator& communicator,
                           RegistrationView& view) {
+  const PoseFrame nominal = problem.frame();
   const CameraGeometry& camera = view.view.camera;
   const FieldIdentity& identity = opened.identity();
   if (opened.field() && camera_distance(camera, identity.camera).is_none()) {
@@ -183,12 +208,7 @@ std::string limit_to_rays(const OpenedField& opened,
   }
   ViewReach reach = all_or_none(communicator, [&] {
     ViewReach found = opened.coverage().reach(view.widest_view(), nominal, identity.range);
-    if (found.held < found.rays)
-      throw FileError(opened.path().string(),
-                      "camera '" + camera.name + "' of the field",
-                      "one that holds all rays of twice the study's region at the nominal pose",
-                      std::to_string(found.held) + " of " + std::to_string(found.rays) +
-                          " rays; the study's has " + found.distance);
+    if (found.held < found.rays) refuse_rays(opened, camera.name, found, problem.views);
     return found;
   });
   reach.box = shared_box(reach.box, communicator);
@@ -257,7 +277,7 @@ void use_fields(const StudyCase& study_case,
     view.renderer = renderers.levels.front();
     for (std::size_t level = 0; level < renderers.blur_sigma_mm.size(); ++level)
       view.coarse_levels.push_back({renderers.levels[level + 1], renderers.blur_sigma_mm[level]});
-    loaded.input_notes[name] = limit_to_rays(field->opened, problem.frame(), communicator, view) +
+    loaded.input_notes[name] = limit_to_rays(field->opened, problem, communicator, view) +
                                "; level 0 is looked up by " + renderers.look_up;
     loaded.inputs[name] = field->opened.info().payload_sha256;
   }

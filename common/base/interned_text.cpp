@@ -4,10 +4,12 @@
 #include <mutex>
 #include <set>
 
+#include "base/fork_aware_mutex.h"
+
 namespace af {
 
 InternedText::InternedText(std::string_view text) {
-  static std::mutex mutex;
+  static ForkAwareMutex mutex;
   static std::set<std::string, std::less<>> kept;  // its elements keep their places
   if (text.empty()) return;
   const std::scoped_lock lock(mutex);

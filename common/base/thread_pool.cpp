@@ -3,9 +3,12 @@
 
 #include <algorithm>
 #include <chrono>
+#include <memory>
 #include <sched.h>
 
 #include "base/error.h"
+#include "base/fork_aware_mutex.h"
+#include "base/stop_condition.h"
 
 namespace af {
 namespace {
@@ -57,15 +60,15 @@ std::vector<std::string> thread_problems(int requested) {
           std::to_string(kMostThreads)};
 }
 
-ThreadPool::ThreadPool(int threads) {
+ThreadPool::ThreadPool(int threads) : generation_(fork_generation()) {
   check(threads >= 1, "a pool has at least one thread");
   // Loops are nested only a few deep.
   open_.reserve(4 * static_cast<std::size_t>(threads));
-  helpers_.reserve(static_cast<std::size_t>(threads) - 1);
-  for (int slot = 1; slot < threads; ++slot) helpers_.emplace_back([this, slot] { help(slot); });
+  start_helpers(threads - 1);
 }
 
 ThreadPool::~ThreadPool() {
+  if (generation_ != fork_generation()) forget_helpers();
   is_ending_ = true;
   ++news_;
   news_.notify_all();
@@ -75,7 +78,44 @@ int ThreadPool::my_slot() const {
   return my_membership.pool == this ? my_membership.slot : 0;
 }
 
+void ThreadPool::start_helpers(int count) {
+  helpers_.reserve(static_cast<std::size_t>(count));
+  for (int slot = 1; slot <= count; ++slot) helpers_.emplace_back([this, slot] { help(slot); });
+}
+
+/// The helpers are threads of another process: they can neither be joined nor destroyed, and what
+/// they were in the middle of stays undone.
+void ThreadPool::forget_helpers() {
+  static_cast<void>(new std::vector<std::jthread>(std::move(helpers_)));
+  helpers_.clear();
+  std::construct_at(&mutex_);
+  open_.clear();
+  generation_ = fork_generation();
+}
+
 void ThreadPool::run(Loop& loop) {
+  if (generation_ != fork_generation()) {
+    const auto count = static_cast<int>(helpers_.size());
+    forget_helpers();
+    start_helpers(count);
+  }
+  StopCondition* const condition = StopCondition::current();
+  if (condition == nullptr) return share(loop);
+  struct Context {
+    Loop& loop;
+    StopCondition* condition;
+  } context{loop, condition};
+  const auto call = [](void* work, int task, int slot) {
+    const Context& in = *static_cast<const Context*>(work);
+    const StopCondition::Shared shared(in.condition);
+    in.condition->throw_if_met();
+    in.loop.call(in.loop.work, task, slot);
+  };
+  Loop stoppable{call, &context, loop.count};
+  share(stoppable);
+}
+
+void ThreadPool::share(Loop& loop) {
   if (loop.count <= 1 || helpers_.empty()) {
     for (int task = 0; task < loop.count; ++task) loop.call(loop.work, task, my_slot());
     return;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <exception>
 #include <mutex>
 #include <string>
@@ -23,7 +24,8 @@ std::vector<std::string> thread_problems(int requested);
 /// Threads that share the tasks of loops. The calling thread is one of them; the others watch for
 /// work for a short while after their last task and then sleep. Loops may be nested: a task may
 /// call for_each(), and threads without work help with it. Loops do not allocate. One thread from
-/// outside at a time. \test ThreadPoolOf.RunsEveryTaskOnce
+/// outside at a time. Loops end early by a StopCondition. In a copy of the process (fork) the first
+/// loop starts the threads anew. \test ThreadPoolOf.RunsEveryTaskOnce
 class ThreadPool {
  public:
   /// `threads`: the caller's included.
@@ -67,6 +69,9 @@ class ThreadPool {
   };
 
   void run(Loop& loop);
+  void share(Loop& loop);
+  void start_helpers(int count);
+  void forget_helpers();
   void run_tasks(Loop& loop, int slot);
   void publish(Loop& loop);
   void withdraw(Loop& loop);
@@ -81,6 +86,7 @@ class ThreadPool {
   std::atomic<int> news_ = 0;        ///< loops opened so far; idle helpers watch it
   std::atomic<int> departures_ = 0;  ///< loops whose last helper has left; their callers watch it
   std::atomic<bool> is_ending_ = false;
+  std::uint32_t generation_;  ///< fork_generation() of the helpers
   std::vector<std::jthread> helpers_;
 };
 

@@ -2,6 +2,7 @@
 #include "field_use/atlas_renderers.h"
 
 #include <algorithm>
+#include <mutex>
 #include <utility>
 
 #include "base/error.h"

@@ -7,9 +7,9 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <vector>
 
+#include "base/fork_aware_mutex.h"
 #include "drr/drr_renderer.h"
 #include "drr/field_set_drr.h"
 #include "geometry/light_slab.h"
@@ -49,7 +49,7 @@ class MembersInUse {
   std::size_t most_;
   std::uint64_t uses_ = 0;
   std::map<std::size_t, Kept> kept_;
-  mutable std::mutex mutex_;
+  mutable ForkAwareMutex mutex_;
 };
 
 /// One level of every member, opened when it is rendered; level 0 are the DRRs themselves.

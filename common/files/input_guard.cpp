@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "base/fork_aware_mutex.h"
 
 namespace af {
 
@@ -120,7 +121,7 @@ class InputGuard {
   }
 
  private:
-  std::mutex mutex_;
+  ForkAwareMutex mutex_;
   std::map<FileId, fs::path> inputs_;
   std::map<FileId, fs::path> outputs_;
   std::vector<fs::path> replaced_folders_;

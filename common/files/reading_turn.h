@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <mutex>
+#include "base/fork_aware_mutex.h"
 
 namespace af {
 
@@ -9,16 +9,26 @@ namespace af {
 /// these libraries are single-threaded. Its holder must not wait for a thread that may want it.
 class ReadingTurn {
  public:
-  ReadingTurn() : guard_(mutex()) {}
+  ReadingTurn() {
+    if (depth() == 0) mutex().lock();
+    ++depth();
+  }
+  ~ReadingTurn() {
+    if (--depth() == 0) mutex().unlock();
+  }
+  ReadingTurn(const ReadingTurn&) = delete;
+  ReadingTurn& operator=(const ReadingTurn&) = delete;
 
  private:
-  /// A reader may use another one.
-  static std::recursive_mutex& mutex() {
-    static std::recursive_mutex one;
+  static ForkAwareMutex& mutex() {
+    static ForkAwareMutex one;
     return one;
   }
-
-  std::lock_guard<std::recursive_mutex> guard_;
+  /// Of this thread: a reader may use another one.
+  static int& depth() {
+    thread_local int turns = 0;
+    return turns;
+  }
 };
 
 }  // namespace af

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "attenuation_fields/ct.h"
 
+#include <mutex>
 #include <utility>
 
 #include "base/error.h"

@@ -2,11 +2,11 @@
 #pragma once
 
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
 
 #include "attenuation_fields/ct.h"
+#include "base/fork_aware_mutex.h"
 #include "volume/attenuation_volume.h"
 
 namespace attenuation_fields {
@@ -22,7 +22,7 @@ struct Ct::Impl {
       const af::AttenuationModel& model) const;
 
  private:
-  mutable std::mutex mutex_;
+  mutable af::ForkAwareMutex mutex_;
   mutable std::weak_ptr<const af::AttenuationVolume> latest_;  ///< under mutex_
 };
 

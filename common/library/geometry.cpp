@@ -141,6 +141,10 @@ Camera Camera::from_projection_matrix(const std::string& name,
   });
 }
 
+void Camera::require_sound() const {
+  library::translated([&] { library::checked_camera(*this); });
+}
+
 std::array<double, 2> Camera::project(const Vector3& room_point) const {
   return library::translated([&] {
     const Eigen::Vector2d pixel =
@@ -163,12 +167,13 @@ Rig Rig::read(const std::string& name_or_path, std::vector<std::string>* warning
   });
 }
 
+void Rig::require_sound() const {
+  library::translated([&] { af::throw_if_any(problems(library::rig_of(*this))); });
+}
+
 std::string Rig::to_toml() const {
-  return library::translated([&] {
-    const af::CameraRig rig = library::rig_of(*this);
-    af::throw_if_any(problems(rig));
-    return af::rig_to_toml(rig);
-  });
+  require_sound();
+  return library::translated([&] { return af::rig_to_toml(library::rig_of(*this)); });
 }
 
 const Camera& Rig::camera(const std::string& camera_name) const {

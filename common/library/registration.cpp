@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/fork_aware_mutex.h"
 #include "base/joined.h"
 #include "base/thread_pool.h"
 #include "gold_standard/target_box.h"
@@ -122,7 +123,7 @@ struct RegistrationCase::Impl {
   std::unique_ptr<registration::RegistrationRunner> runner;
   std::unique_ptr<registration::PoseExaminer> examiner;
   std::unique_ptr<registration::UncertaintyEstimator> estimator;
-  std::mutex mutex;  ///< of runner, examiner and estimator
+  af::ForkAwareMutex mutex;  ///< of runner, examiner and estimator
 
   [[nodiscard]] std::optional<double> tre_mm(const af::RigidTransform& pose) const {
     if (!gold.has_value()) return std::nullopt;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "base/fork_aware_mutex.h"
 #include "base/plausible.h"
 #include "base/thread_pool.h"
 #include "drr/field_renderer.h"
@@ -172,8 +173,8 @@ struct Renderer::Impl {
     workspaces_.push_back(std::move(workspace));
   }
 
-  mutable std::mutex pool_mutex_;  ///< one thread from outside at a time may use the pool
-  mutable std::mutex workspace_mutex_;
+  mutable af::ForkAwareMutex pool_mutex_;  ///< one thread from outside at a time may use the pool
+  mutable af::ForkAwareMutex workspace_mutex_;
   mutable std::vector<std::unique_ptr<af::RenderWorkspace>> workspaces_;
 };
 

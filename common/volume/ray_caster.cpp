@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "base/error.h"
+#include "base/stop_condition.h"
 #include "base/vector_width.h"
 #include "volume/ray_caster_kernel.h"
 #include "volume/ray_slopes.h"
@@ -250,10 +251,14 @@ class FanCaster {
 /// Calls work(row) for the rows of a fan, shared by the threads of a pool, when there is one.
 template <typename Work>
 void for_each_row(const RayFan& fan, ThreadPool* pool, const Work& work) {
-  if (pool != nullptr)
+  if (pool != nullptr) {
     pool->for_each(fan.rows, [&](int row, int /*slot*/) { work(row); });
-  else
-    for (int row = 0; row < fan.rows; ++row) work(row);
+    return;
+  }
+  for (int row = 0; row < fan.rows; ++row) {
+    throw_if_stopped();
+    work(row);
+  }
 }
 
 void require_value_per_ray(const RayFan& fan, std::span<const float> values) {

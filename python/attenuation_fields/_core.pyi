@@ -22,15 +22,15 @@ class Camera:
         detector_origin_point: ArrayLike,
         column_direction: ArrayLike,
         row_direction: ArrayLike,
-        pixel_spacing_mm: Sequence[float],
-        size_px: Sequence[int],
+        pixel_spacing_mm: ArrayLike,
+        size_px: ArrayLike,
     ) -> None: ...
     @staticmethod
     def from_projection_matrix(
         name: str,
         pixels_from_room: ArrayLike,
-        pixel_spacing_mm: Sequence[float],
-        size_px: Sequence[int],
+        pixel_spacing_mm: ArrayLike,
+        size_px: ArrayLike,
         isocenter_point: ArrayLike = ...,
     ) -> Camera: ...
     def project(self, room_point: ArrayLike) -> Sequence[float]: ...
@@ -64,7 +64,7 @@ def read_pose(path: _Path) -> NDArray[np.float64]: ...
 class Ct:
     def __init__(
         self,
-        hu: NDArray[np.int16],
+        hu: ArrayLike,
         spacing_mm: ArrayLike,
         origin_mm: ArrayLike = ...,
         direction: ArrayLike = ...,
@@ -97,16 +97,16 @@ class Renderer:
     def threads(self) -> int: ...
     def drr(
         self,
-        rotation_deg: Sequence[float] = ...,
-        translation_mm: Sequence[float] = ...,
+        rotation_deg: ArrayLike = ...,
+        translation_mm: ArrayLike = ...,
         *,
         pose: Optional[ArrayLike] = ...,
         out: Optional[NDArray[np.float32]] = ...,
     ) -> NDArray[np.float32]: ...
     def drr_and_gradient(
         self,
-        rotation_deg: Sequence[float] = ...,
-        translation_mm: Sequence[float] = ...,
+        rotation_deg: ArrayLike = ...,
+        translation_mm: ArrayLike = ...,
         *,
         out: Optional[NDArray[np.float32]] = ...,
         gradient_out: Optional[NDArray[np.float32]] = ...,
@@ -291,9 +291,9 @@ class Table:
     def numbers(self, column: str) -> NDArray[np.float64]: ...
 
 def mean_tre_mm(
-    pose: ArrayLike, gold: ArrayLike, target_box_ct_mm: Sequence[Sequence[float]]
+    pose: ArrayLike, gold: ArrayLike, target_box_ct_mm: ArrayLike
 ) -> float: ...
-def psnr_db(drr: NDArray[np.float32], reference: NDArray[np.float32]) -> Optional[float]: ...
+def psnr_db(drr: ArrayLike, reference: ArrayLike) -> Optional[float]: ...
 
 class SuccessRate:
     @property

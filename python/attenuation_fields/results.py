@@ -6,10 +6,10 @@ from __future__ import annotations
 import json
 import os
 from dataclasses import dataclass
-from typing import Any, Dict, Mapping, Optional, Sequence, Union
+from typing import Any, Dict, Mapping, Optional, Union
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from attenuation_fields._core import (
     Camera,
@@ -120,10 +120,10 @@ def read_image_quality(path: Path) -> Dict[str, Column]:
 def ray_cast(
     ct: Ct,
     camera: Camera,
-    rotation_deg: Sequence[float] = (0.0, 0.0, 0.0),
-    translation_mm: Sequence[float] = (0.0, 0.0, 0.0),
+    rotation_deg: ArrayLike = (0.0, 0.0, 0.0),
+    translation_mm: ArrayLike = (0.0, 0.0, 0.0),
     *,
-    isocenter_point: Sequence[float] = (0.0, 0.0, 0.0),
+    isocenter_point: ArrayLike = (0.0, 0.0, 0.0),
     frame: Optional[PoseFrame] = None,
     water_mu_per_mm: float = 0.0200,
     step_mm: float = 1.0,
@@ -152,8 +152,8 @@ def register(
     study: Path,
     case_name: str = "",
     *,
-    rotation_deg: Optional[Sequence[float]] = None,
-    translation_mm: Optional[Sequence[float]] = None,
+    rotation_deg: Optional[ArrayLike] = None,
+    translation_mm: Optional[ArrayLike] = None,
     **options: Any,
 ) -> Registration:
     """Registers a case of a study from one start, as af-register does.

@@ -17,8 +17,11 @@ namespace attenuation_fields::python {
 
 namespace py = pybind11;
 
-/// float64, C order; another kind of sequence is converted.
-using Numbers = py::array_t<double, py::array::c_style | py::array::forcecast>;
+/// An argument that is to hold numbers: an array, a sequence, a tensor, ... It is taken whatever it
+/// is, so that errors are ours.
+struct Numbers {
+  py::object given;
+};
 
 /// "(3,)", "(n, 6)": a shape as errors state it.
 std::string shape_text(const py::array& array);
@@ -26,8 +29,14 @@ std::string shape_text(const py::array& array);
 /// InputError naming `name` unless the array has this shape; -1 is any extent.
 void require_shape(const py::array& array, const char* name, const std::vector<py::ssize_t>& shape);
 
-/// InputError naming `name` unless the numbers are aligned in memory.
-void require_aligned(const py::array& array, const char* name);
+/// The argument as an array, not copied if it is one. InputError naming `name` unless it holds real
+/// numbers.
+py::array array_of_numbers(const Numbers& numbers, const char* name);
+
+/// The same with this shape, converted to float64 or float32 in C order.
+template <typename Number>
+py::array_t<Number, py::array::c_style | py::array::forcecast> converted(
+    const Numbers& numbers, const char* name, const std::vector<py::ssize_t>& shape);
 
 /// A new float32 array, or `out` itself: InputError unless that is float32, C-contiguous, aligned,
 /// writeable and of this shape.
@@ -40,6 +49,9 @@ std::span<float> floats_of(py::array_t<float>& array);
 /// InputError naming both when two outputs share memory.
 void require_apart(std::span<const float> first, std::span<const float> second, const char* names);
 
+/// InputErrors of these name `name`.
+std::array<double, 2> pair_of(const Numbers& values, const char* name);
+std::array<int, 2> whole_pair_of(const Numbers& values, const char* name);
 Vector3 vector_of(const Numbers& values, const char* name);
 Pose pose_of(const Numbers& matrix, const char* name);
 std::vector<Pose> poses_of(const Numbers& matrices, const char* name);
@@ -57,3 +69,21 @@ void bind_registration(py::module_& module);
 void bind_evaluation(py::module_& module);
 
 }  // namespace attenuation_fields::python
+
+namespace pybind11::detail {
+
+template <>
+struct type_caster<attenuation_fields::python::Numbers> {
+  PYBIND11_TYPE_CASTER(attenuation_fields::python::Numbers, const_name("ArrayLike"));
+  bool load(handle source, bool /*convert*/) {
+    value.given = reinterpret_borrow<object>(source);
+    return true;
+  }
+  static handle cast(const attenuation_fields::python::Numbers& numbers,
+                     return_value_policy /*policy*/,
+                     handle /*parent*/) {
+    return numbers.given.inc_ref();
+  }
+};
+
+}  // namespace pybind11::detail

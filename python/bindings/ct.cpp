@@ -2,6 +2,7 @@
 #include "attenuation_fields/ct.h"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <limits>
 #include <pybind11/stl.h>
@@ -9,32 +10,56 @@
 
 #include "attenuation_fields/errors.h"
 #include "python/bindings/arrays.h"
+#include "python/bindings/pickled.h"
 #include "python/bindings/texts.h"
+#include "python/bindings/without_lock.h"
 
 namespace attenuation_fields::python {
 namespace {
 
 using namespace pybind11::literals;
 
-/// int16, C order: such an array is taken as it is, another is converted.
 using Voxels = py::array_t<std::int16_t, py::array::c_style>;
 
 /// Keeps an array; the last thread that lets go of it takes the interpreter's lock first.
 std::shared_ptr<const void> kept(const py::array& array) {
-  auto* const reference = new py::object(array);
-  return {reference, [](const void* pointer) {
-            const py::gil_scoped_acquire lock;
-            delete static_cast<const py::object*>(pointer);
+  return {new py::object(array), [](void* pointer) {
+            with_lock([](void* object) { delete static_cast<py::object*>(object); }, pointer);
           }};
 }
 
-Ct ct_of_array(const Voxels& hu,
+std::int16_t exact_hu(double value, py::ssize_t k, py::ssize_t j, py::ssize_t i) {
+  using Limits = std::numeric_limits<std::int16_t>;
+  if (!(value >= Limits::min() && value <= Limits::max() && std::floor(value) == value))
+    throw InputError("hu = " + std::string(py::str(py::float_(value))) +
+                     " at (k, j, i) = " + std::string(py::str(py::make_tuple(k, j, i))) +
+                     ": must be whole numbers from -32768 to 32767, as int16 holds them");
+  return static_cast<std::int16_t>(value);
+}
+
+/// An aligned int16 array in C order is taken as it is. Another one is converted slice by slice.
+Voxels voxels_of_array(const Numbers& hu) {
+  const py::array array = array_of_numbers(hu, "hu");
+  require_shape(array, "hu", {-1, -1, -1});
+  if (py::isinstance<Voxels>(array) &&
+      (array.flags() & py::detail::npy_api::NPY_ARRAY_ALIGNED_) != 0)
+    return array;
+  Voxels voxels({array.shape(0), array.shape(1), array.shape(2)});
+  for (py::ssize_t k = 0; k < array.shape(0); ++k) {
+    const auto slice = converted<double>({array[py::int_(k)]}, "hu", {-1, -1});
+    for (py::ssize_t j = 0; j < array.shape(1); ++j)
+      for (py::ssize_t i = 0; i < array.shape(2); ++i)
+        voxels.mutable_at(k, j, i) = exact_hu(slice.at(j, i), k, j, i);
+  }
+  return voxels;
+}
+
+Ct ct_of_array(const Numbers& numbers,
                const Numbers& spacing_mm,
                const Numbers& origin_mm,
-               const Numbers& direction) {
-  require_shape(hu, "hu", {-1, -1, -1});
-  require_aligned(hu, "hu");
-  require_shape(direction, "direction", {3, 3});
+               const Numbers& axes) {
+  const Voxels hu = voxels_of_array(numbers);
+  const auto direction = converted<double>(axes, "direction", {3, 3});
   CtGrid grid;
   for (int axis = 0; axis < 3; ++axis) {
     const py::ssize_t extent = hu.shape(2 - axis);
@@ -49,10 +74,7 @@ Ct ct_of_array(const Voxels& hu,
 }
 
 Ct ct_read(const std::filesystem::path& path, const std::string& series_uid) {
-  Ct ct = [&] {
-    const py::gil_scoped_release release;
-    return Ct::read(path, series_uid);
-  }();
+  Ct ct = without_lock([&] { return Ct::read(path, series_uid); });
   warn_of(ct.warnings());
   return ct;
 }
@@ -80,9 +102,9 @@ void bind_ct(py::module_& module) {
       "origin_mm"_a = std::array<double, 3>{},
       "direction"_a =
           std::array<std::array<double, 3>, 3>{{{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}}},
-      "A CT of an int16 array (k, j, i), which is not copied when it is in C order: it must "
-      "not change afterwards, because attenuation and hash are kept. spacing_mm and origin_mm are "
-      "(x, y, z), the columns of direction those of i, j, k.");
+      "A CT of an array (k, j, i) of whole HU, int16 or exact as int16. An int16 array in C order "
+      "is not copied: it must not change afterwards, because attenuation and hash are kept. "
+      "spacing_mm and origin_mm are (x, y, z), the columns of direction those of i, j, k.");
   ct.def_static("read",
                 &ct_read,
                 "path"_a,
@@ -104,6 +126,18 @@ void bind_ct(py::module_& module) {
                            &Ct::content_sha256,
                            "Of size and voxels, not of where they lie: Field.is_of(ct) compares "
                            "that, too.");
+  ct.def(py::pickle(
+      [](const Ct& self) {
+        const CtGrid& grid = self.grid();
+        return py::make_tuple(voxels_of(self),
+                              array_of(grid.spacing_mm),
+                              array_of(grid.origin_mm),
+                              py::array_t<double>({3, 3}, grid.direction.data()));
+      },
+      [](const py::tuple& state) {
+        return ct_of_array({state[0]}, {state[1]}, {state[2]}, {state[3]});
+      }));
+  def_copies(ct);
 }
 
 }  // namespace attenuation_fields::python

@@ -1,16 +1,34 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
+#include "attenuation_fields/errors.h"
 #include "python/bindings/arrays.h"
+#include "python/bindings/pickled.h"
 #include "python/bindings/texts.h"
 
 namespace attenuation_fields::python {
 namespace {
 
 using namespace pybind11::literals;
+
+/// A camera or a rig that has no problems: InputError.
+template <typename Owner>
+Owner sound(Owner owner) {
+  owner.require_sound();
+  return owner;
+}
+
+/// Sets a member, unless the owner would not be sound with it.
+template <typename Owner, typename Value>
+void set_soundly(Owner& owner, Value Owner::*member, const Value& value) {
+  Owner changed = owner;
+  changed.*member = value;
+  owner = sound(std::move(changed));
+}
 
 /// A member of three numbers, seen as an array.
 template <typename Owner>
@@ -19,7 +37,22 @@ void bind_vector(py::class_<Owner>& owner, const char* name, Vector3 Owner::*mem
       name,
       [member](const Owner& self) { return array_of(self.*member); },
       [member, name](Owner& self, const Numbers& values) {
-        self.*member = vector_of(values, name);
+        set_soundly(self, member, vector_of(values, name));
+      });
+}
+
+/// An axis of the detector. Both are set one after the other, so that they are orthogonal is
+/// checked where the camera is used.
+void bind_axis(py::class_<Camera>& camera, const char* name, Vector3 Camera::*member) {
+  camera.def_property(
+      name,
+      [member](const Camera& self) { return array_of(self.*member); },
+      [member, name](Camera& self, const Numbers& values) {
+        const Vector3 axis = vector_of(values, name);
+        if (!(std::abs(std::hypot(axis[0], axis[1], axis[2]) - 1.0) < 1e-5))
+          throw InputError(std::string(name) + " = " + std::string(py::str(array_of(axis))) +
+                           ": must have length 1");
+        self.*member = axis;
       });
 }
 
@@ -34,15 +67,15 @@ void bind_camera(py::module_& module) {
                          const Numbers& detector_origin_point,
                          const Numbers& column_direction,
                          const Numbers& row_direction,
-                         const std::array<double, 2>& pixel_spacing_mm,
-                         const std::array<int, 2>& size_px) {
-               return Camera{name,
-                             vector_of(source_point, "source_point"),
-                             vector_of(detector_origin_point, "detector_origin_point"),
-                             vector_of(column_direction, "column_direction"),
-                             vector_of(row_direction, "row_direction"),
-                             pixel_spacing_mm,
-                             size_px};
+                         const Numbers& pixel_spacing_mm,
+                         const Numbers& size_px) {
+               return sound(Camera{name,
+                                   vector_of(source_point, "source_point"),
+                                   vector_of(detector_origin_point, "detector_origin_point"),
+                                   vector_of(column_direction, "column_direction"),
+                                   vector_of(row_direction, "row_direction"),
+                                   pair_of(pixel_spacing_mm, "pixel_spacing_mm"),
+                                   whole_pair_of(size_px, "size_px")});
              }),
              "name"_a,
              "source_point"_a,
@@ -55,14 +88,17 @@ void bind_camera(py::module_& module) {
       "from_projection_matrix",
       [](const std::string& name,
          const Numbers& pixels_from_room,
-         const std::array<double, 2>& pixel_spacing_mm,
-         const std::array<int, 2>& size_px,
+         const Numbers& pixel_spacing_mm,
+         const Numbers& size_px,
          const Numbers& isocenter_point) {
-        require_shape(pixels_from_room, "pixels_from_room", {3, 4});
+        const auto values = converted<double>(pixels_from_room, "pixels_from_room", {3, 4});
         std::array<double, 12> matrix{};
-        std::copy_n(pixels_from_room.data(), matrix.size(), matrix.begin());
-        return Camera::from_projection_matrix(
-            name, matrix, pixel_spacing_mm, size_px, vector_of(isocenter_point, "isocenter_point"));
+        std::copy_n(values.data(), matrix.size(), matrix.begin());
+        return Camera::from_projection_matrix(name,
+                                              matrix,
+                                              pair_of(pixel_spacing_mm, "pixel_spacing_mm"),
+                                              whole_pair_of(size_px, "size_px"),
+                                              vector_of(isocenter_point, "isocenter_point"));
       },
       "name"_a,
       "pixels_from_room"_a,
@@ -70,13 +106,28 @@ void bind_camera(py::module_& module) {
       "size_px"_a,
       "isocenter_point"_a = std::array<double, 3>{},
       "The camera of a 3x4 projection matrix (pixels from room mm).");
-  camera.def_readwrite("name", &Camera::name);
+  camera.def_property(
+      "name",
+      [](const Camera& self) { return self.name; },
+      [](Camera& self, const std::string& name) { set_soundly(self, &Camera::name, name); });
   bind_vector(camera, "source_point", &Camera::source_point);
   bind_vector(camera, "detector_origin_point", &Camera::detector_origin_point);
-  bind_vector(camera, "column_direction", &Camera::column_direction);
-  bind_vector(camera, "row_direction", &Camera::row_direction);
-  camera.def_readwrite("pixel_spacing_mm", &Camera::pixel_spacing_mm, "(column, row)");
-  camera.def_readwrite("size_px", &Camera::size_px, "(columns, rows)");
+  bind_axis(camera, "column_direction", &Camera::column_direction);
+  bind_axis(camera, "row_direction", &Camera::row_direction);
+  camera.def_property(
+      "pixel_spacing_mm",
+      [](const Camera& self) { return self.pixel_spacing_mm; },
+      [](Camera& self, const Numbers& values) {
+        set_soundly(self, &Camera::pixel_spacing_mm, pair_of(values, "pixel_spacing_mm"));
+      },
+      "(column, row)");
+  camera.def_property(
+      "size_px",
+      [](const Camera& self) { return self.size_px; },
+      [](Camera& self, const Numbers& values) {
+        set_soundly(self, &Camera::size_px, whole_pair_of(values, "size_px"));
+      },
+      "(columns, rows)");
   camera.def(
       "project",
       [](const Camera& self, const Numbers& room_point) {
@@ -88,12 +139,20 @@ void bind_camera(py::module_& module) {
     return "Camera('" + self.name + "', " + std::to_string(self.size_px[0]) + " x " +
            std::to_string(self.size_px[1]) + ")";
   });
+  def_pickle(camera,
+             &Camera::name,
+             &Camera::source_point,
+             &Camera::detector_origin_point,
+             &Camera::column_direction,
+             &Camera::row_direction,
+             &Camera::pixel_spacing_mm,
+             &Camera::size_px);
 }
 
 void bind_rig(py::module_& module) {
   py::class_<Rig> rig(module, "Rig", "The cameras of one room.");
   rig.def(py::init([](std::vector<Camera> cameras, const Numbers& isocenter_point) {
-            return Rig{vector_of(isocenter_point, "isocenter_point"), std::move(cameras)};
+            return sound(Rig{vector_of(isocenter_point, "isocenter_point"), std::move(cameras)});
           }),
           "cameras"_a,
           "isocenter_point"_a = std::array<double, 3>{});
@@ -114,6 +173,7 @@ void bind_rig(py::module_& module) {
       [](const Rig& self, const std::string& name) { return self.camera(name); },
       "name"_a);
   rig.def("to_toml", &Rig::to_toml, "The text of a rig file.");
+  def_pickle(rig, &Rig::isocenter_point, &Rig::cameras);
 }
 
 void bind_frame(py::module_& module) {
@@ -153,6 +213,7 @@ void bind_frame(py::module_& module) {
       },
       "pose"_a,
       "rx, ry, rz (degrees), tx, ty, tz (mm) of room_from_ct.");
+  def_pickle(frame, &PoseFrame::rotation, &PoseFrame::center_ct_mm, &PoseFrame::center_room_mm);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include "attenuation_fields/version.h"
 #include "python/bindings/arrays.h"
 #include "python/bindings/texts.h"
+#include "python/bindings/without_lock.h"
 
 namespace attenuation_fields::python {
 namespace {
@@ -41,6 +42,7 @@ void bind_errors(py::module_& /*module*/) {
 PYBIND11_MODULE(_core, module) {
   namespace bindings = attenuation_fields::python;
   module.doc() = "The compiled part of attenuation_fields.";
+  bindings::await_calls_at_the_end();
   bindings::bind_errors(module);
   bindings::bind_geometry(module);
   bindings::bind_ct(module);

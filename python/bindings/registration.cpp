@@ -6,12 +6,15 @@
 #include <pybind11/stl/filesystem.h>
 
 #include "python/bindings/arrays.h"
+#include "python/bindings/pickled.h"
 #include "python/bindings/texts.h"
+#include "python/bindings/without_lock.h"
 
 namespace attenuation_fields::python {
 namespace {
 
 using namespace pybind11::literals;
+using PythonCase = MadeBy<RegistrationCase>;
 
 void bind_result(py::module_& module) {
   py::class_<ViewAgreement> view(
@@ -19,6 +22,7 @@ void bind_result(py::module_& module) {
   view.def_readonly("camera", &ViewAgreement::camera);
   view.def_readonly("coarse", &ViewAgreement::coarse);
   view.def_readonly("fine", &ViewAgreement::fine);
+  def_pickle(view, &ViewAgreement::camera, &ViewAgreement::coarse, &ViewAgreement::fine);
   py::class_<Uncertainty> uncertainty(
       module, "Uncertainty", "What a registration says of its own error.");
   uncertainty.def_property_readonly(
@@ -41,6 +45,11 @@ void bind_result(py::module_& module) {
       "tre_95_mm", &Uncertainty::tre_95_mm, "The TRE stays below with a probability of 0.95.");
   uncertainty.def_readonly(
       "confidence", &Uncertainty::confidence, "Probability of a TRE below 2.5 mm.");
+  def_pickle(uncertainty,
+             &Uncertainty::covariance,
+             &Uncertainty::tre_rms_mm,
+             &Uncertainty::tre_95_mm,
+             &Uncertainty::confidence);
   py::class_<Registration> result(module, "Registration", "Where a registration led.");
   result.def_readonly("start_index", &Registration::start_index);
   result.def_property_readonly("start",
@@ -71,6 +80,25 @@ void bind_result(py::module_& module) {
   result.def("__repr__", [](const Registration& self) {
     return "Registration(" + self.verdict + ": " + self.reason + ")";
   });
+  def_pickle(result,
+             &Registration::start_index,
+             &Registration::start,
+             &Registration::pose,
+             &Registration::start_parameters,
+             &Registration::parameters,
+             &Registration::verdict,
+             &Registration::reason,
+             &Registration::similarity,
+             &Registration::chain,
+             &Registration::stop_reason,
+             &Registration::evaluations,
+             &Registration::inadmissible,
+             &Registration::drr_count,
+             &Registration::views,
+             &Registration::uncertainty,
+             &Registration::initial_tre_mm,
+             &Registration::tre_mm,
+             &Registration::seconds);
 }
 
 /// The pixels themselves, read-only; the array keeps the case.
@@ -92,7 +120,7 @@ struct PythonView {
   py::object mask;
 };
 
-std::vector<PythonView> views_of(const RegistrationCase& owner) {
+std::vector<PythonView> views_of(const PythonCase& owner) {
   std::vector<PythonView> views;
   for (const CaseView& view : owner.views()) {
     py::object mask = py::none();
@@ -143,19 +171,12 @@ RegistrationCase load(const std::filesystem::path& study,
   options.threads = threads;
   options.calibration_error_px = calibration_error_px;
   options.no_uncertainty = no_uncertainty;
-  RegistrationCase loaded = [&] {
-    const py::gil_scoped_release release;
+  RegistrationCase loaded = without_lock([&] {
     return RegistrationCase::load(
         study, case_name, options, {tube_kvp, aluminium_mm, scatter_to_primary});
-  }();
+  });
   warn_of(loaded.warnings());
   return loaded;
-}
-
-template <typename Compute>
-auto without_lock(const Compute& compute) {
-  const py::gil_scoped_release release;
-  return compute();
 }
 
 void bind_case(py::module_& module) {
@@ -169,12 +190,23 @@ void bind_case(py::module_& module) {
                     &PythonView::xray,
                     "Whole detector (h, w) in the attenuation domain: bright is attenuated.");
   view.def_readonly("mask", &PythonView::mask, "Non-zero is used (h, w); None: every pixel.");
-  py::class_<RegistrationCase> registration_case(
+  def_pickle(view, &PythonView::camera, &PythonView::roi_px, &PythonView::xray, &PythonView::mask);
+  py::class_<PythonCase> registration_case(
       module,
       "RegistrationCase",
       "A case of a study with all that its registrations need, as af-register loads it.");
   registration_case.def_static("load",
-                               &load,
+                               keeping_arguments(&load, {"study",           "case_name",
+                                                         "preset",          "renderer",
+                                                         "fields",          "chains",
+                                                         "similarity",      "optimizer",
+                                                         "max_evaluations", "correct",
+                                                         "skip_ct_check",   "water_mu_per_mm",
+                                                         "air_below_hu",    "step_mm",
+                                                         "ct_series_uid",   "seed",
+                                                         "threads",         "calibration_error_px",
+                                                         "no_uncertainty",  "tube_kvp",
+                                                         "aluminium_mm",    "scatter_to_primary"}),
                                "study"_a,
                                "case_name"_a = "",
                                py::kw_only(),
@@ -199,14 +231,15 @@ void bind_case(py::module_& module) {
                                "aluminium_mm"_a = Beam{}.aluminium_mm,
                                "scatter_to_primary"_a = Beam{}.scatter_to_primary,
                                "Options are those of af-register.");
+  def_made_again(registration_case, "registration_case");
   registration_case.def_property_readonly("name", &RegistrationCase::name);
   registration_case.def_property_readonly(
       "views", &views_of, "The case's X-rays, with their cameras and regions of interest.");
-  registration_case.def_property_readonly(
-      "frame", [](const RegistrationCase& self) { return self.frame(); });
+  registration_case.def_property_readonly("frame",
+                                          [](const PythonCase& self) { return self.frame(); });
   registration_case.def_property_readonly(
       "gold",
-      [](const RegistrationCase& self) -> py::object {
+      [](const PythonCase& self) -> py::object {
         const std::optional<Pose> gold = self.gold();
         if (!gold.has_value()) return py::none();
         return matrix_of(*gold);
@@ -214,7 +247,7 @@ void bind_case(py::module_& module) {
       "The pose that errors are measured against, or None.");
   registration_case.def(
       "landmark_start",
-      [](const RegistrationCase& self) -> py::object {
+      [](const PythonCase& self) -> py::object {
         const std::optional<Pose> start = without_lock([&] { return self.landmark_start(); });
         if (!start.has_value()) return py::none();
         return matrix_of(*start);
@@ -222,44 +255,42 @@ void bind_case(py::module_& module) {
       "The pose that the study's landmarks give, or None without them.");
   registration_case.def(
       "usual_start",
-      [](const RegistrationCase& self) {
+      [](const PythonCase& self) {
         return matrix_of(without_lock([&] { return self.usual_start(); }));
       },
       "Where af-register starts unless told: at landmark_start(), else at the nominal pose.");
   registration_case.def(
       "tre_mm",
-      [](const RegistrationCase& self, const Numbers& pose) {
+      [](const PythonCase& self, const Numbers& pose) {
         return self.tre_mm(pose_of(pose, "pose"));
       },
       "pose"_a,
       "Target registration error of a 4x4 pose; None without a gold pose.");
   registration_case.def(
       "run",
-      [](const RegistrationCase& self, const std::optional<Numbers>& start, std::int64_t index) {
+      [](const PythonCase& self, const std::optional<Numbers>& start, std::int64_t index) {
         std::optional<Pose> pose;
         if (start.has_value()) pose = pose_of(*start, "start");
-        const py::gil_scoped_release release;
-        return self.run(pose.has_value() ? *pose : self.usual_start(), index);
+        return without_lock(
+            [&] { return self.run(pose.has_value() ? *pose : self.usual_start(), index); });
       },
       "start"_a = py::none(),
       "start_index"_a = 0,
       "Registers from a 4x4 start [usual_start()].");
   registration_case.def(
       "run_all",
-      [](const RegistrationCase& self, const Numbers& starts) {
+      [](const PythonCase& self, const Numbers& starts) {
         const std::vector<Pose> poses = poses_of(starts, "starts");
-        const py::gil_scoped_release release;
-        return self.run_all(poses);
+        return without_lock([&] { return self.run_all(poses); });
       },
       "starts"_a,
       "Registers from many starts (n, 4, 4); the X-rays of the best end are not looked into, as "
       "run() does.");
   registration_case.def(
       "similarity",
-      [](const RegistrationCase& self, const Numbers& pose) {
+      [](const PythonCase& self, const Numbers& pose) {
         const Pose room_from_ct = pose_of(pose, "pose");
-        const py::gil_scoped_release release;
-        return self.similarity(room_from_ct);
+        return without_lock([&] { return self.similarity(room_from_ct); });
       },
       "pose"_a,
       "What results are compared by, at a 4x4 pose; None where it is inadmissible.");

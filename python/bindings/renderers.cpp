@@ -7,6 +7,8 @@
 #include "attenuation_fields/errors.h"
 #include "attenuation_fields/renderer.h"
 #include "python/bindings/arrays.h"
+#include "python/bindings/pickled.h"
+#include "python/bindings/without_lock.h"
 
 namespace attenuation_fields::python {
 namespace {
@@ -23,9 +25,11 @@ std::vector<py::ssize_t> shape_of(const Renderer& renderer,
 
 /// A pose given as a matrix, or by rotations and translations.
 Pose pose_of(const Renderer& renderer,
-             const Vector3& rotation_deg,
-             const Vector3& translation_mm,
+             const Numbers& rotation,
+             const Numbers& translation,
              const std::optional<Numbers>& pose) {
+  const Vector3 rotation_deg = vector_of(rotation, "rotation_deg");
+  const Vector3 translation_mm = vector_of(translation, "translation_mm");
   if (!pose.has_value()) return renderer.frame().pose(rotation_deg, translation_mm);
   if (rotation_deg != Vector3{} || translation_mm != Vector3{})
     throw InputError(
@@ -34,32 +38,30 @@ Pose pose_of(const Renderer& renderer,
 }
 
 py::array_t<float> drr(const Renderer& self,
-                       const Vector3& rotation_deg,
-                       const Vector3& translation_mm,
+                       const Numbers& rotation_deg,
+                       const Numbers& translation_mm,
                        const std::optional<Numbers>& pose,
                        const py::object& out) {
   const Pose room_from_ct = pose_of(self, rotation_deg, translation_mm, pose);
   py::array_t<float> image = output_array(shape_of(self, {}), out, "out");
   const std::span<float> pixels = floats_of(image);
-  const py::gil_scoped_release release;
-  self.drr(room_from_ct, pixels);
+  without_lock([&] { return self.drr(room_from_ct, pixels); });
   return image;
 }
 
 py::tuple drr_and_gradient(const Renderer& self,
-                           const Vector3& rotation_deg,
-                           const Vector3& translation_mm,
+                           const Numbers& rotation,
+                           const Numbers& translation,
                            const py::object& out,
                            const py::object& gradient_out) {
+  const Vector3 rotation_deg = vector_of(rotation, "rotation_deg");
+  const Vector3 translation_mm = vector_of(translation, "translation_mm");
   py::array_t<float> image = output_array(shape_of(self, {}), out, "out");
   py::array_t<float> gradient = output_array(shape_of(self, {6}), gradient_out, "gradient_out");
   const std::span<float> pixels = floats_of(image);
   const std::span<float> planes = floats_of(gradient);
   require_apart(pixels, planes, "out, gradient_out");
-  {
-    const py::gil_scoped_release release;
-    self.drr_and_gradient(rotation_deg, translation_mm, pixels, planes);
-  }
+  without_lock([&] { return self.drr_and_gradient(rotation_deg, translation_mm, pixels, planes); });
   return py::make_tuple(image, gradient);
 }
 
@@ -72,15 +74,12 @@ py::tuple drr_and_motion_gradient(const Renderer& self,
   py::array_t<float> gradient(shape_of(self, {6}));
   const std::span<float> pixels = floats_of(image);
   const std::span<float> planes = floats_of(gradient);
-  {
-    const py::gil_scoped_release release;
-    self.drr_and_motion_gradient(room_from_ct, pivot, pixels, planes);
-  }
+  without_lock([&] { return self.drr_and_motion_gradient(room_from_ct, pivot, pixels, planes); });
   return py::make_tuple(image, gradient);
 }
 
-std::vector<std::array<double, 6>> rows_of(const Numbers& parameters) {
-  require_shape(parameters, "parameters", {-1, 6});
+std::vector<std::array<double, 6>> rows_of(const Numbers& numbers) {
+  const auto parameters = converted<double>(numbers, "parameters", {-1, 6});
   std::vector<std::array<double, 6>> rows(static_cast<std::size_t>(parameters.shape(0)));
   const double* values = parameters.data();
   for (auto& row : rows) {
@@ -107,8 +106,7 @@ py::array_t<float> drrs(const Renderer& self,
   py::array_t<float> stack =
       output_array(shape_of(self, {static_cast<py::ssize_t>(matrices.size())}), out, "out");
   const std::span<float> pixels = floats_of(stack);
-  const py::gil_scoped_release release;
-  self.drrs(matrices, pixels);
+  without_lock([&] { return self.drrs(matrices, pixels); });
   return stack;
 }
 
@@ -119,10 +117,7 @@ py::tuple drrs_and_gradients(const Renderer& self, const Numbers& parameters) {
   py::array_t<float> gradients(shape_of(self, {count, 6}));
   const std::span<float> pixels = floats_of(stack);
   const std::span<float> planes = floats_of(gradients);
-  {
-    const py::gil_scoped_release release;
-    self.drrs_and_gradients(rows, pixels, planes);
-  }
+  without_lock([&] { return self.drrs_and_gradients(rows, pixels, planes); });
   return py::make_tuple(stack, gradients);
 }
 
@@ -181,23 +176,34 @@ Outside outside_of(const std::string& name) {
   throw InputError("outside = " + name + ": must be raise or zero");
 }
 
+Field open_field(const std::filesystem::path& path,
+                 const std::string& look_up,
+                 const std::optional<Camera>& camera,
+                 int threads,
+                 const std::string& outside,
+                 double tube_kvp,
+                 double aluminium_mm,
+                 double scatter_to_primary) {
+  const FieldOptions options{look_up, camera, threads, outside_of(outside)};
+  return without_lock([&] {
+    return Field::open(path, options, {tube_kvp, aluminium_mm, scatter_to_primary});
+  });
+}
+
 void bind_field(py::module_& module) {
-  py::class_<Field, Renderer> field(
+  py::class_<MadeBy<Field>, Renderer> field(
       module, "Field", "A precomputed attenuation field of one CT for one camera.");
   field.def_static(
       "open",
-      [](const std::filesystem::path& path,
-         const std::string& look_up,
-         const std::optional<Camera>& camera,
-         int threads,
-         const std::string& outside,
-         double tube_kvp,
-         double aluminium_mm,
-         double scatter_to_primary) {
-        const FieldOptions options{look_up, camera, threads, outside_of(outside)};
-        const py::gil_scoped_release release;
-        return Field::open(path, options, {tube_kvp, aluminium_mm, scatter_to_primary});
-      },
+      keeping_arguments(&open_field,
+                        {"path",
+                         "look_up",
+                         "camera",
+                         "threads",
+                         "outside",
+                         "tube_kvp",
+                         "aluminium_mm",
+                         "scatter_to_primary"}),
       "path"_a,
       py::kw_only(),
       "look_up"_a = "",
@@ -222,31 +228,46 @@ void bind_field(py::module_& module) {
   field.def_property_readonly("ct_content_sha256", &Field::ct_content_sha256);
   field.def_property_readonly("payload_sha256", &Field::payload_sha256);
   field.def_property_readonly("water_mu_per_mm", &Field::water_mu_per_mm);
+  def_made_again(field, "field", &Field::payload_sha256);
+}
+
+RayCaster ray_caster_of(const Ct& ct,
+                        const Camera& camera,
+                        const Numbers& isocenter_point,
+                        const std::optional<PoseFrame>& frame,
+                        double water_mu_per_mm,
+                        int air_below_hu,
+                        double step_mm,
+                        int threads,
+                        double tube_kvp,
+                        double aluminium_mm,
+                        double scatter_to_primary) {
+  const RayCasterOptions options{water_mu_per_mm,
+                                 air_below_hu,
+                                 step_mm,
+                                 frame,
+                                 vector_of(isocenter_point, "isocenter_point"),
+                                 threads};
+  return without_lock([&] {
+    return RayCaster(ct, camera, options, {tube_kvp, aluminium_mm, scatter_to_primary});
+  });
 }
 
 void bind_ray_caster(py::module_& module) {
-  py::class_<RayCaster, Renderer> caster(
+  py::class_<MadeBy<RayCaster>, Renderer> caster(
       module, "RayCaster", "Casts rays through a CT. No ray is ever outside.");
-  caster.def(py::init([](const Ct& ct,
-                         const Camera& camera,
-                         const Numbers& isocenter_point,
-                         const std::optional<PoseFrame>& frame,
-                         double water_mu_per_mm,
-                         int air_below_hu,
-                         double step_mm,
-                         int threads,
-                         double tube_kvp,
-                         double aluminium_mm,
-                         double scatter_to_primary) {
-               const RayCasterOptions options{water_mu_per_mm,
-                                              air_below_hu,
-                                              step_mm,
-                                              frame,
-                                              vector_of(isocenter_point, "isocenter_point"),
-                                              threads};
-               const py::gil_scoped_release release;
-               return RayCaster(ct, camera, options, {tube_kvp, aluminium_mm, scatter_to_primary});
-             }),
+  caster.def(py::init(keeping_arguments(&ray_caster_of,
+                                        {"ct",
+                                         "camera",
+                                         "isocenter_point",
+                                         "frame",
+                                         "water_mu_per_mm",
+                                         "air_below_hu",
+                                         "step_mm",
+                                         "threads",
+                                         "tube_kvp",
+                                         "aluminium_mm",
+                                         "scatter_to_primary"})),
              "ct"_a,
              "camera"_a,
              py::kw_only(),
@@ -260,6 +281,7 @@ void bind_ray_caster(py::module_& module) {
              "aluminium_mm"_a = Beam{}.aluminium_mm,
              "scatter_to_primary"_a = Beam{}.scatter_to_primary,
              "frame: what poses are relative to; without one the CT's centre at isocenter_point.");
+  def_made_again(caster, "ray_caster");
 }
 
 }  // namespace

@@ -3,6 +3,8 @@
 # A DRR looked up in a field beside the same DRR cast through the CT.
 #
 #     python3 look_up_and_compare.py FIELD.af.h5 CT [PICTURE.png]
+#
+# The picture needs Debian's python3-matplotlib, or `pip install matplotlib`.
 
 # %%
 import sys

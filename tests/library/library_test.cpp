@@ -24,6 +24,7 @@ namespace attenuation_fields {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::SizeIs;
@@ -248,6 +249,24 @@ TEST(LibraryRenderer, MayBeCalledFromSeveralThreads) {
   }
 }
 
+TEST(LibraryRenderer, EndsEarlyWhenAConditionIsMet) {
+  for (const int threads : {1, 2}) {
+    const Field field = Field::open(study_file("AP.af.h5"), {.threads = threads});
+    const Pose pose = field.frame().pose(kRotationDeg, kTranslationMm);
+    const std::vector<Pose> poses(1000, pose);
+    std::vector<float> stack(poses.size() * field.pixel_count());
+    int questions = 0;
+    try {
+      const StopCondition condition([&] { return ++questions == 2; });
+      for (;;) field.drrs(poses, stack);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.exit_code(), 75);
+    }
+    EXPECT_EQ(questions, 2);
+    EXPECT_EQ(drr_of(field, pose), last_floats(study_file("field.mha"), field.pixel_count()));
+  }
+}
+
 TEST(LibraryRenderer, RefusesOrCountsRaysOutside) {
   const Pose far = Field::open(study_file("AP.af.h5")).frame().pose({}, {300.0, 0.0, 0.0});
   const Field throwing = Field::open(study_file("AP.af.h5"));
@@ -434,7 +453,8 @@ TEST(LibraryRegistration, RefusesWhatTheProgramRefuses) {
   options.preset = "fast";
   EXPECT_THAT(message_of<InputError>(
                   [&] { (void)RegistrationCase::load(study_file("study.toml"), "", options); }),
-              HasSubstr("field = none"));
+              AllOf(HasSubstr("field = none: give fields={\"AP\": \"FIELD.h5\"}"),
+                    HasSubstr("renderer=raycast")));
   EXPECT_THAT(message_of<InputError>(
                   [&] { (void)RegistrationCase::load(study_file("study.toml"), "knee", options); }),
               HasSubstr("ellipsoids"));

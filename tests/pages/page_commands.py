@@ -2,14 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Runs the commands of a page, so that a reader can.
 
-Usage: page_commands.py --run PAGE PROGRAMS       runs all ```sh blocks of a page in one scratch folder
+Usage: page_commands.py --run PAGE PROGRAMS       runs all ```sh and ```python blocks of a page in one scratch folder
        page_commands.py --check ROOT              blocks of every page are of a known kind, those that are not run say
                                                   why, and name options that our programs have
        page_commands.py --pages ROOT              prints the pages that have ```sh blocks
 
 A block marked ```sh is run, from the top of the page to its end, with small data of the names that our pages use
-(small_data.py). A block marked ```console shows commands that are not run; the line behind it begins with
-"*Not run by the tests:" and gives the reason.
+(small_data.py); on such a page a ```python block, too. A block marked ```console shows commands that are not run; the
+line behind it begins with "*Not run by the tests:" and gives the reason. So may the line behind a ```python block.
 """
 import os
 import re
@@ -83,9 +83,12 @@ def check(root):
 
 def script_of(page):
     parts = ["set -euo pipefail"]
-    for kind, number, text, _ in blocks_of(page):
-        if kind == "sh":
-            parts.append(f"echo '--- {page.name}:{number}'\n{text}")
+    for kind, number, text, behind in blocks_of(page):
+        if kind == "python" and not behind.startswith(EXCUSE):
+            text = f"/usr/bin/python3 -W error - <<'END OF PYTHON'\n{text}\nEND OF PYTHON"
+        elif kind != "sh":
+            continue
+        parts.append(f"echo '--- {page.name}:{number}'\n{text}")
     return "\n".join(parts) + "\n"
 
 
@@ -96,6 +99,7 @@ def run(page, programs):
             (Path(folder) / name).symlink_to(root / name)
         environment = dict(os.environ)
         environment["PATH"] = f"{programs}:{environment['PATH']}"
+        environment["PYTHONPATH"] = str(programs.parent / "python")
         environment["OMPI_ALLOW_RUN_AS_ROOT"] = environment["OMPI_ALLOW_RUN_AS_ROOT_CONFIRM"] = "1"
         environment["OMPI_MCA_rmaps_base_oversubscribe"] = "1"
         script = script_of(page)

@@ -304,7 +304,7 @@ TEST_F(RegisterProgram, RefusesAFieldOfAnotherCamera) {
   const test::ProgramRun run =
       run_register("--field AP=" + path("LAT.af.h5") + " --field LAT=" + path("LAT.af.h5") +
                    " -o " + path("refused"));
-  expect_refused(run, 4, "camera 'AP' of the field");
+  expect_refused(run, 4, "LAT.af.h5: this is the field of camera 'LAT', not of camera 'AP'");
   EXPECT_FALSE(fs::exists(path("refused")));
 }
 
@@ -322,6 +322,12 @@ TEST_F(RegisterProgram, LooksThroughARecalibratedCameraIntoTheOldField) {
   EXPECT_NE(run.output.find("source 0.50 mm"), std::string::npos) << run.output;
   EXPECT_NE(run.output.find("field covers 100 % of camera AP's rays within"), std::string::npos)
       << run.output;
+  expect_refused(
+      test::run_command(program("af-register") + " --study " + (other / "study.toml").string() +
+                        " --field AP=" + path("LAT.af.h5") + " --field LAT=" + path("LAT.af.h5") +
+                        " -o " + (other / "refused").string()),
+      4,
+      "camera 'AP' of the field: expected one that holds all rays");
 }
 
 TEST_F(RegisterProgram, RefusesAFieldOfAnotherCtAndNamesBothHashes) {

@@ -5,9 +5,12 @@ AF_LIBRARY_STUDY names the study's folder. Bits are compared, not values.
 """
 
 import ast
+import copy
 import gc
 import inspect
+import multiprocessing
 import os
+import pickle
 import re
 import subprocess
 import tempfile
@@ -266,9 +269,120 @@ class ErrorsTest(unittest.TestCase):
         ):
             with self.assertRaisesRegex(af.InputError, text):
                 call()
-        with self.assertRaises(TypeError):
-            field.drr(rotation_deg=(1, 2))
 
+    def test_every_argument_of_numbers_is_named_with_what_is_expected_and_found(self):
+        field = open_field()
+        frame = field.frame
+        camera = field.camera
+        rest = ((0, 0, 0), (0, 500, 0), (1, 0, 0), (0, 0, 1), (1, 1), (64, 64))
+        names = (
+            "source_point", "detector_origin_point", "column_direction", "row_direction",
+            "pixel_spacing_mm", "size_px",
+        )
+
+        def camera_with(name, value):
+            given = dict(zip(names, rest))
+            given[name] = value
+            return af.Camera("A", **given)
+
+        voxels = np.zeros((2, 3, 4), np.int16)
+        calls = {
+            "rotation_deg": (3, lambda x: field.drr(x)),
+            "translation_mm": (3, lambda x: field.drr_and_gradient((0, 0, 0), x)),
+            "pose": ((4, 4), lambda x: field.drr(pose=x)),
+            "pivot_room_mm": (3, lambda x: field.drr_and_motion_gradient(np.eye(4), x)),
+            "parameters": ((-1, 6), field.drrs),
+            "poses": ((-1, 4, 4), lambda x: field.drrs(poses=x)),
+            "nominal": ((4, 4), lambda x: af.PoseFrame.about(x, (0, 0, 0))),
+            "center_ct_mm": (3, lambda x: af.PoseFrame.about(np.eye(4), x)),
+            "room_point": (3, camera.project),
+            "isocenter_point": (3, lambda x: af.Rig([camera], x)),
+            "pixels_from_room": (
+                (3, 4), lambda x: af.Camera.from_projection_matrix("A", x, (1, 1), (8, 8))
+            ),
+            "hu": ((-1, -1, -1), lambda x: af.Ct(x, (1, 1, 1))),
+            "spacing_mm": (3, lambda x: af.Ct(voxels, x)),
+            "origin_mm": (3, lambda x: af.Ct(voxels, (1, 1, 1), x)),
+            "direction": ((3, 3), lambda x: af.Ct(voxels, (1, 1, 1), (0, 0, 0), x)),
+            "gold": ((4, 4), lambda x: af.mean_tre_mm(np.eye(4), x, ((0, 0, 0), (1, 1, 1)))),
+            "target_box_ct_mm": ((2, 3), lambda x: af.mean_tre_mm(np.eye(4), np.eye(4), x)),
+            "tre_mm": ((-1,), af.success_rate),
+            "drr": ((2, 3), lambda x: af.psnr_db(x, np.ones((2, 3)))),
+        }
+        for name, size in zip(names, (3, 3, 3, 3, 2, 2)):
+            calls[name] = (size, lambda x, name=name: camera_with(name, x))
+        for name, (shape, call) in calls.items():
+            shape = shape if isinstance(shape, tuple) else (shape,)
+            expected = str(shape).replace("-1", "n")
+            right = tuple(2 if extent < 0 else extent for extent in shape)
+            for wrong, found in (
+                (np.zeros(right + (5,)), f"shape = {right + (5,)}: must be {expected}"),
+                (7.0, f"shape = (): must be {expected}"),
+                (np.zeros(right, complex), "complex128: must be an array of real numbers"),
+                ("text", "str of "),
+                ([[1.0], [2.0, 3.0]], "list: must be an array of real numbers"),
+                (np.full(right, "x", object), "of other objects than numbers"),
+            ):
+                with self.subTest(name, wrong=found):
+                    with self.assertRaisesRegex(af.InputError, rf"^{name}(:| =) ") as caught:
+                        call(wrong)
+                    self.assertIn(found, str(caught.exception))
+        with self.assertRaisesRegex(af.InputError, r"^size_px = 64.5: must be whole numbers"):
+            camera_with("size_px", (64.5, 64))
+        with self.assertRaisesRegex(af.InputError, r"^out = float64 \(2, 2\): must be float32 in C order"):
+            field.drr(out=np.zeros((2, 2)))
+
+    def test_cameras_that_cannot_be_are_refused(self):
+        good = {
+            "name": "A",
+            "source_point": (0, -700, 0),
+            "detector_origin_point": (-126, 400, 126),
+            "column_direction": (1, 0, 0),
+            "row_direction": (0, 0, -1),
+            "pixel_spacing_mm": (4, 4),
+            "size_px": (64, 64),
+        }
+        for name, value, text in (
+            ("column_direction", (2, 0, 0), "column_direction = .*: must have length 1"),
+            ("row_direction", (0.6, 0, 0.8), "must be orthogonal to column_direction"),
+            ("pixel_spacing_mm", (0, 1), "pixel_spacing_mm = "),
+            ("pixel_spacing_mm", (float("nan"), 1), "pixel_spacing_mm = "),
+            ("size_px", (0, 64), "size_px = "),
+            ("source_point", (0, float("inf"), 0), "source_point = "),
+            ("source_point", (0, 400, 0), "must not lie on the detector plane"),
+            ("name", "", "name = "),
+        ):
+            with self.assertRaisesRegex(af.InputError, text):
+                af.Camera(**{**good, name: value})
+            camera = af.Camera(**good)
+            if "orthogonal" in text:
+                camera.row_direction = value
+                with self.assertRaisesRegex(af.InputError, text):
+                    camera.project((0, 0, 0))
+                continue
+            with self.assertRaisesRegex(af.InputError, text):
+                setattr(camera, name, value)
+            np.testing.assert_array_equal(getattr(camera, name), good[name])
+        camera = af.Camera(**good)
+        with self.assertRaisesRegex(af.InputError, "unique"):
+            af.Rig([camera, camera])
+
+    def test_errors_name_arguments_of_python(self):
+        with self.assertRaises(af.InputError) as caught:
+            af.register(STUDY / "study.toml")
+        self.assertIn('give fields={"AP": "FIELD.h5"}', str(caught.exception))
+        self.assertIn("or renderer=raycast", str(caught.exception))
+        self.assertNotIn("--", str(caught.exception))
+        with self.assertRaises(af.InputError) as caught:
+            af.register(STUDY / "study.toml", renderer="raycast", correct=True)
+        self.assertIn("correct = set: must not be given with renderer raycast", str(caught.exception))
+
+    def test_fields_of_swapped_cameras_are_told(self):
+        swapped = {"AP": STUDY / "LAT.af.h5", "LAT": STUDY / "AP.af.h5"}
+        with self.assertRaisesRegex(
+            af.FileError, r"LAT\.af\.h5: this is the field of camera 'LAT', not of camera 'AP'"
+        ):
+            af.register(STUDY / "study.toml", fields=swapped)
 
     def test_texts_that_are_not_utf8_are_still_errors_warnings_and_cells(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -335,10 +449,37 @@ class CtTest(unittest.TestCase):
             af.Ct(voxels[0], (1.0, 1.0, 1.0))
         with self.assertRaisesRegex(af.InputError, "orthonormal"):
             af.Ct(voxels, (1.0, 1.0, 1.0), direction=2.0 * np.eye(3))
-        with self.assertRaises(TypeError):
-            af.Ct(voxels.astype(np.float32), (1.0, 1.0, 1.0))
-        with self.assertRaisesRegex(af.InputError, "aligned"):
-            af.Ct(FieldTest.unaligned((4, 5, 6), np.int16), (1.0, 1.0, 1.0))
+
+    def test_voxels_that_int16_holds_exactly_are_converted(self):
+        voxels = np.arange(-60, 60, dtype=np.int16).reshape(4, 5, 6)
+        expected = af.Ct(voxels, (1, 1, 1)).content_sha256
+        unaligned = FieldTest.unaligned(voxels.shape, np.int16)
+        unaligned[...] = voxels
+        wide = np.repeat(voxels, 2, axis=2)
+        for given in (
+            *(voxels.astype(kind) for kind in (">i2", "i1", "i4", ">i4", "i8", "f2", "f4", ">f8", "O")),
+            np.asfortranarray(voxels),
+            wide[:, :, ::2],
+            voxels[::-1, ::-1, ::-1][::-1, ::-1, ::-1],
+            unaligned,
+            voxels.tolist(),
+        ):
+            self.assertEqual(af.Ct(given, (1, 1, 1)).content_sha256, expected)
+        for dtype, value, found in (
+            (np.float32, 0.5, "0.5"),
+            (np.float64, np.nan, "nan"),
+            (np.float64, -np.inf, "-inf"),
+            (np.float64, 1e300, "1e\\+300"),
+            (np.uint16, 32768, "32768.0"),
+            (np.uint64, 2**64 - 1, "1.8"),
+            (np.int32, -32769, "-32769.0"),
+        ):
+            wrong = np.zeros((4, 5, 6), dtype)
+            wrong[1, 2, 3] = value
+            with self.assertRaisesRegex(
+                af.InputError, rf"^hu = {found}.* at \(k, j, i\) = \(1, 2, 3\): .* int16"
+            ):
+                af.Ct(wrong, (1, 1, 1))
 
     def test_cameras_go_through_their_matrix(self):
         camera = af.Rig.read("c-arm-12in").camera("LAT")
@@ -475,6 +616,100 @@ class RegistrationTest(unittest.TestCase):
             af.RegistrationCase.load(STUDY / "study.toml", preset="fast")
         with self.assertRaisesRegex(af.InputError, "ellipsoids"):
             af.RegistrationCase.load(STUDY / "study.toml", "knee")
+
+
+class PickleTest(unittest.TestCase):
+    """What a user sends to another process comes back the same."""
+
+    fields = RegistrationTest.fields
+
+    @staticmethod
+    def sent(value):
+        return pickle.loads(pickle.dumps(value))
+
+    def assert_same(self, first, second, what=""):
+        """Every public property, to the bit."""
+        self.assertIs(type(first), type(second), what)
+        if isinstance(first, np.ndarray):
+            self.assertEqual(first.dtype, second.dtype, what)
+            self.assertEqual(first.tobytes(), second.tobytes(), what)
+        elif isinstance(first, (list, tuple)):
+            self.assertEqual(len(first), len(second), what)
+            for a, b in zip(first, second):
+                self.assert_same(a, b, what)
+        elif type(first).__module__ == af._core.__name__:
+            for name, member in vars(type(first)).items():
+                if isinstance(member, property):
+                    self.assert_same(getattr(first, name), getattr(second, name), name)
+        else:
+            self.assertEqual(repr(first), repr(second), what)
+
+    def test_values_come_back_to_the_bit(self):
+        case = af.RegistrationCase.load(STUDY / "study.toml", preset="fast", fields=self.fields)
+        found = case.run(case.frame.pose((-1, 0.5, 2.5), (0.5, 1, 4)))
+        rig = af.Rig.read(STUDY / "rig.toml")
+        for value in (
+            rig, rig.cameras[0], case.frame, af.Ct.read(STUDY / "ct.nii.gz"), found, found.uncertainty,
+            *found.views, *case.views, af.success_rate([1.0, 3.0]), af.Table.read(STUDY / "starts.csv"),
+            open_field(), case, af.read_result(STUDY / "fast"),
+        ):
+            with self.subTest(type(value).__name__):
+                for again in (self.sent(value), copy.copy(value), copy.deepcopy(value)):
+                    self.assert_same(value, again)
+
+    def test_renderers_come_back_with_their_options(self):
+        ct = af.Ct.read(STUDY / "ct.nii.gz")
+        camera = af.Rig.read(STUDY / "rig.toml").camera("LAT")
+        plain = open_field()
+        for renderer in (
+            af.Field.open(
+                STUDY / "AP.af.h5",
+                look_up="cubic",
+                threads=2,
+                outside="zero",
+                camera=plain.camera,
+                tube_kvp=80,
+            ),
+            af.RayCaster(ct, camera, frame=plain.frame, step_mm=2.5, scatter_to_primary=0.1),
+        ):
+            again = self.sent(renderer)
+            self.assertEqual(again.threads, renderer.threads)
+            self.assertEqual(
+                again.drr(ROTATION_DEG, (0, 90, 0)).tobytes(), renderer.drr(ROTATION_DEG, (0, 90, 0)).tobytes()
+            )
+            self.assertIs(copy.deepcopy(renderer), renderer)
+
+    def test_a_field_is_found_from_another_folder_and_must_be_the_same(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder, "A.af.h5")
+            path.write_bytes((STUDY / "AP.af.h5").read_bytes())
+            before = os.getcwd()
+            os.chdir(folder)
+            try:
+                sent = pickle.dumps(af.Field.open("A.af.h5"))
+            finally:
+                os.chdir(before)
+            self.assertEqual(pickle.loads(sent).camera.name, "AP")
+            path.write_bytes((STUDY / "LAT.af.h5").read_bytes())
+            with self.assertRaisesRegex(af.FileError, "payload_sha256: expected .*, found "):
+                pickle.loads(sent)
+
+    def test_errors_come_back(self):
+        for kind, code in ((af.InputError, 3), (af.FileError, 4), (af.NumericError, 5)):
+            again = self.sent(kind("text"))
+            self.assertEqual((type(again), str(again), again.exit_code), (kind, "text", code))
+        with self.assertRaises(af.FileError) as caught:
+            af.Field.open("nowhere.af.h5")
+        again = self.sent(caught.exception)
+        self.assertEqual((str(again), again.exit_code), (str(caught.exception), 4))
+
+    def test_processes_share_a_batch(self):
+        parameters = PARAMETERS * np.linspace(-1.0, 1.0, 4)[:, None]
+        field = open_field()
+        for way in ("fork", "spawn"):
+            with multiprocessing.get_context(way).Pool(2) as pool:
+                parts = pool.map(field.drrs, np.split(parameters, 2))
+            self.assertEqual(np.concatenate(parts).tobytes(), field.drrs(parameters).tobytes())
 
 
 class ResultsTest(unittest.TestCase):

@@ -9,4 +9,5 @@
 #include "attenuation_fields/geometry.h"
 #include "attenuation_fields/registration.h"
 #include "attenuation_fields/renderer.h"
+#include "attenuation_fields/stop_condition.h"
 #include "attenuation_fields/version.h"

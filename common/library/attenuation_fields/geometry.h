@@ -38,6 +38,8 @@ struct ATTENUATION_FIELDS_API Camera {
                                        const std::array<int, 2>& size_px,
                                        const Vector3& isocenter_point = {0.0, 0.0, 0.0});
 
+  /// InputError that names every value that no camera has.
+  void require_sound() const;
   /// (column, row) where the ray from the source through a room point meets the detector plane.
   [[nodiscard]] std::array<double, 2> project(const Vector3& room_point) const;
 };
@@ -50,6 +52,8 @@ struct ATTENUATION_FIELDS_API Rig {
   /// A rig shipped by name ("c-arm-12in", "treatment-room") or a rig file. `warnings` receives what
   /// is odd about it. InputError, FileError.
   static Rig read(const std::string& name_or_path, std::vector<std::string>* warnings = nullptr);
+  /// InputError that names every value that no rig has, its cameras' included.
+  void require_sound() const;
   /// The text of a rig file that read() reads back to the last bit.
   [[nodiscard]] std::string to_toml() const;
   /// InputError that lists the known names.

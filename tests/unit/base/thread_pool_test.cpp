@@ -2,11 +2,19 @@
 #include "base/thread_pool.h"
 
 #include <chrono>
+#include <functional>
+#include <mutex>
 #include <sched.h>
 #include <stdexcept>
 #include <string>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "base/fork_aware_mutex.h"
+#include "base/stop_condition.h"
 
 namespace af {
 namespace {
@@ -115,6 +123,114 @@ TEST(ThreadPool, RefusesNegativeAndAbsurdNumbers) {
   EXPECT_TRUE(thread_problems(1024).empty());
   EXPECT_EQ(thread_problems(-1).size(), 1u);
   EXPECT_EQ(thread_problems(1025).size(), 1u);
+}
+
+/// Whether `works` gives true in a copy of this process; an alarm ends a copy that hangs.
+bool in_copy(const std::function<bool()>& works) {
+  const pid_t copy = ::fork();
+  if (copy == 0) {
+    ::alarm(20);
+    ::_exit(works() ? 0 : 1);
+  }
+  int status = -1;
+  ::waitpid(copy, &status, 0);
+  return status == 0;
+}
+
+TEST_P(ThreadPoolOf, StartsItsThreadsAnewInACopyOfTheProcess) {
+  ThreadPool pool(GetParam());
+  const auto all_take_part = [&] {
+    std::atomic<int> begun = 0;
+    pool.for_each(GetParam(), [&](int /*task*/, int /*slot*/) {
+      ++begun;
+      while (begun < GetParam()) std::this_thread::yield();
+    });
+    return begun == GetParam();
+  };
+  EXPECT_TRUE(all_take_part());
+  EXPECT_TRUE(in_copy([&] { return all_take_part() && in_copy(all_take_part); }));
+  EXPECT_TRUE(in_copy([&] { return std::make_unique<ThreadPool>(GetParam()) != nullptr; }));
+  EXPECT_TRUE(all_take_part());
+}
+
+TEST(ThreadPool, OfAnotherThreadMayBeForgottenInACopyOfTheProcess) {
+  ThreadPool pool(3);
+  std::atomic<bool> is_over = false;
+  std::jthread other([&] {
+    while (!is_over) pool.for_each(100, [](int /*task*/, int /*slot*/) {});
+  });
+  for (int i = 0; i < 50; ++i)
+    EXPECT_TRUE(in_copy([&] {
+      std::destroy_at(&pool);
+      return true;
+    }));
+  is_over = true;
+}
+
+TEST(ForkAwareMutex, IsRefusedInACopyWhereAnotherThreadHeldIt) {
+  ForkAwareMutex mutex;
+  const auto is_refused = [&] {
+    try {
+      const std::lock_guard lock(mutex);
+      return false;
+    } catch (const InputError& error) {
+      return std::string(error.what()).find("copy (fork)") != std::string::npos;
+    }
+  };
+  EXPECT_TRUE(in_copy([&] { return !is_refused() && !is_refused(); }));
+  std::atomic<bool> is_held = false;
+  std::atomic<bool> is_over = false;
+  std::jthread other([&] {
+    const std::lock_guard lock(mutex);
+    is_held = true;
+    is_over.wait(false);
+  });
+  while (!is_held) std::this_thread::yield();
+  EXPECT_TRUE(in_copy([&] { return is_refused() && is_refused(); }));
+  is_over = true;
+  is_over.notify_all();
+  EXPECT_FALSE(is_refused());
+}
+
+TEST(ForkAwareMutex, ExcludesOtherThreadsAndRefusesItsHolder) {
+  ForkAwareMutex mutex;
+  int sum = 0;
+  ThreadPool pool(4);
+  pool.for_each(20000, [&](int /*task*/, int /*slot*/) {
+    const std::lock_guard lock(mutex);
+    ++sum;
+  });
+  EXPECT_EQ(sum, 20000);
+  const std::lock_guard lock(mutex);
+  EXPECT_THROW(mutex.lock(), InputError);
+}
+
+TEST(StopCondition, EndsALoopOnAllItsThreads) {
+  for (const int threads : {1, 3}) {
+    ThreadPool pool(threads);
+    const std::thread::id caller = std::this_thread::get_id();
+    int questions = 0;
+    std::atomic<int> nested_ends = 0;
+    const auto nested = [&](int /*task*/, int /*slot*/) {
+      try {
+        pool.for_each(1 << 30, [](int /*task*/, int /*slot*/) { std::this_thread::yield(); });
+      } catch (const StoppedError&) {
+        ++nested_ends;
+        throw;
+      }
+    };
+    {
+      const StopCondition condition([&] {
+        EXPECT_EQ(std::this_thread::get_id(), caller);
+        return ++questions == 2;
+      });
+      EXPECT_THROW(pool.for_each(threads, nested), StoppedError);
+      EXPECT_GT(nested_ends, 0);
+      EXPECT_THROW(pool.for_each(1, [](int /*task*/, int /*slot*/) {}), StoppedError);
+    }
+    EXPECT_EQ(questions, 2);
+    pool.for_each(1, [](int /*task*/, int /*slot*/) {});
+  }
 }
 
 }  // namespace

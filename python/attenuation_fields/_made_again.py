@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What pickle calls to make objects again that are known by the arguments that made them."""
+
+from typing import Any, Dict
+
+from attenuation_fields._core import Field, RayCaster, RegistrationCase, Table
+from attenuation_fields.errors import FileError
+
+
+def field(arguments: Dict[str, Any], payload_sha256: str) -> Field:
+    found = Field.open(**arguments)
+    if found.payload_sha256 != payload_sha256:
+        raise FileError(
+            f"{arguments['path']}: payload_sha256: expected {payload_sha256}, that of the pickled "
+            f"field, found {found.payload_sha256}"
+        )
+    return found
+
+
+def ray_caster(arguments: Dict[str, Any]) -> RayCaster:
+    return RayCaster(**arguments)
+
+
+def registration_case(arguments: Dict[str, Any]) -> RegistrationCase:
+    return RegistrationCase.load(**arguments)
+
+
+def table(arguments: Dict[str, Any]) -> Table:
+    return Table.read(**arguments)
