@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Installs the Debian 12 packages that building and running needs. Idempotent: with everything in place it
+# Installs the packages of Debian 12 or 13 that building and running needs. Idempotent: with everything in place it
 # asks dpkg only and ends at once. Needs root or sudo only when something is missing.
 set -euo pipefail
 
@@ -14,14 +14,17 @@ base_packages=(
   libgtest-dev libgmock-dev
   python3-dev python3-numpy pybind11-dev python3-wheel
   libcairo2-dev libexpat1-dev fonts-dejavu-core gnuplot-nox
-  dpkg-dev
+  dpkg-dev file
   invesalius-examples
 )
+# Debian 13's package of ITK names these libraries without depending on them.
+trixie_packages=(libfftw3-dev)
 benchmark_packages=(plastimatch libfaiss-dev libopenblas-dev)
 # What jobs/peers.sh registers with.
 peer_packages=(plastimatch elastix python3-torch python3-nlopt)
 # Formatter, linters, the browser that opens the report in a test, and what reads manual pages and completions in tests.
-lint_packages=(clang-format-14 clang-tidy-14 shellcheck chromium groff-base bsdextrautils zsh)
+lint_packages=(shellcheck chromium groff-base bsdextrautils zsh)
+bookworm_lint_packages=(clang-format-14 clang-tidy-14)
 # Large, and only one test and one example of the Python module need it; they are skipped without it.
 torch_packages=(python3-torch)
 slurm_packages=(slurm-wlm munge)
@@ -30,11 +33,12 @@ usage() {
   cat <<'TEXT'
 Usage: jobs/install-packages.sh [--with-lint] [--with-benchmarks] [--with-slurm] [--with-torch] [--with-peers] [--check] [--help]
 
-Installs the Debian 12 packages that the project needs to build, run and pass its tests. Says what it does; does
-nothing when all are there. Needs root or sudo only to install.
+Installs the packages that the project needs to build, run and pass its tests on Debian 12 (bookworm) or 13 (trixie).
+Says what it does; does nothing when all are there. Needs root or sudo only to install.
 
   --with-lint         also the formatter, the linters, the browser that checks reports, and what checks manual pages and
-                      completions (clang-format-14, clang-tidy-14, shellcheck, chromium, groff-base, bsdextrautils, zsh)
+                      completions (shellcheck, chromium, groff-base, bsdextrautils, zsh, and clang-format-14 and
+                      clang-tidy-14, which Debian 13 does not have)
   --with-benchmarks   also what tests/benchmark/run.sh compares with (plastimatch, Faiss, OpenBLAS)
   --with-slurm        also a Slurm of one node, for tests/slurm
   --with-torch        also PyTorch, for the test and the example of differentiable DRRs
@@ -47,8 +51,17 @@ is_installed() {
   [[ "$(dpkg-query --show --showformat '${db:Status-Status}' "$1" 2>/dev/null || true)" == installed ]]
 }
 
+# The code name of the release this is: bookworm, trixie, or another one's.
+release_name() { sed -n 's/^VERSION_CODENAME=//p' /etc/os-release; }
+
 main() {
-  local packages=("${base_packages[@]}") check_only=no
+  local packages=("${base_packages[@]}") check_only=no release
+  release=$(release_name)
+  case "$release" in
+    bookworm) lint_packages+=("${bookworm_lint_packages[@]}") ;;
+    trixie) packages+=("${trixie_packages[@]}") ;;
+    *) echo "install-packages.sh: this is $release; tried on bookworm and trixie (Debian 12 and 13) only" >&2 ;;
+  esac
   while (($# > 0)); do
     case "$1" in
       --with-lint) packages+=("${lint_packages[@]}") ;;

@@ -12,7 +12,7 @@ usage() {
 Usage: jobs/local.sh [OPTIONS]
        jobs/local.sh STUDY.toml [OPTIONS]    a study of yours: see jobs/run-study.sh --help
 
-Installs what is missing, builds, and takes a CT through the whole pipeline: simulated X-ray pair, one attenuation
+Installs what is missing, builds programs and Python module, and takes a CT through the whole pipeline: simulated X-ray pair, one attenuation
 field per camera, image quality of the fields, registrations by the presets paper and robust, report.html. Finished stages with unchanged inputs are
 skipped, so an interrupted run goes on where it stopped when the same command is run again.
 
@@ -180,10 +180,10 @@ if [[ "$skip_packages" == no ]]; then
   "$af_root/jobs/install-packages.sh" || die 1 "packages are missing (see above); --skip-packages goes on without them"
 fi
 if [[ -f "$af_root/CMakeLists.txt" && "$skip_build" == no ]]; then
-  say "Building the programs in build/release ..."
+  say "Building the programs and the Python module in build/release ..."
   build_start=$SECONDS
   mkdir -p "$af_root/build"
-  build_preset release "$af_root/build/release.log" "${af_programs[@]}"
+  build_preset release "$af_root/build/release.log" "${af_programs[@]}" python-module
   say "        $(duration $((SECONDS - build_start)))"
 fi
 bin=$(program_folder)
@@ -232,3 +232,8 @@ if ((${#stage_report[@]} > 0)); then
   printf '%s\n' "${stage_report[@]}"
 fi
 say "Report: $output/report.html"
+say "To use the programs in this shell: export PATH=$(printf '%q' "$bin"):\$PATH"
+python_folder="$af_root/build/release/python"
+if [[ -e "$python_folder" ]]; then
+  say "To use the Python module, too:     export PYTHONPATH=$(printf '%q' "$python_folder")   # for /usr/bin/python3"
+fi

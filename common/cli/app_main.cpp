@@ -156,6 +156,9 @@ int app_main(CLI::App& app,
              int argc,
              char** argv,
              const std::function<void(const Communicator&)>& run) {
+  // A write beyond a limit of file sizes is an error to report, not a signal to die from. MPI
+  // itself writes files.
+  std::signal(SIGXFSZ, SIG_IGN);
   std::optional<WaitAlarm> alarm;  // outlives MPI
   std::optional<MpiEnvironment> environment;
   app.name(program_name(argv[0]));
@@ -172,8 +175,6 @@ int app_main(CLI::App& app,
   }
   environment.emplace(argc, argv);
   const Communicator world = Communicator::world();
-  // A write beyond a limit of file sizes is an error to report, not a signal to die from.
-  std::signal(SIGXFSZ, SIG_IGN);
   std::optional<StallWatch> watch;
   const double stall_minutes = run_limits().stall_minutes;
   if (stall_minutes > 0.0) {

@@ -37,12 +37,14 @@ endforeach()
 
 install(FILES packaging/copyright DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(FILES packaging/lintian-overrides DESTINATION ${CMAKE_INSTALL_DATADIR}/lintian/overrides RENAME attenuation-fields)
+# Empty where there is no /etc/os-release.
+cmake_host_system_information(RESULT af_release_name QUERY DISTRIB_VERSION_CODENAME)
 # af_install_changelog(<package> <component>): what Debian wants of a package beside its copyright.
 function(af_install_changelog package component)
   install(
     CODE "
       set(log \"${CMAKE_CURRENT_BINARY_DIR}/help/${package}/changelog\")
-      file(WRITE \"\${log}\" \"${package} (${PROJECT_VERSION}) bookworm; urgency=medium\\n\\n  * Built from source by CPack.\\n\\n -- ${AF_PACKAGE_CONTACT}  Thu, 01 Jan 1970 00:00:00 +0000\\n\")
+      file(WRITE \"\${log}\" \"${package} (${PROJECT_VERSION}) ${af_release_name}; urgency=medium\\n\\n  * Built from source by CPack.\\n\\n -- ${AF_PACKAGE_CONTACT}  Thu, 01 Jan 1970 00:00:00 +0000\\n\")
       execute_process(COMMAND gzip -9nf \"\${log}\" COMMAND_ERROR_IS_FATAL ANY)
       file(INSTALL \"\${log}.gz\" DESTINATION \"\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_DATAROOTDIR}/doc/${package}\")"
     COMPONENT ${component})

@@ -1,102 +1,172 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Installs the Debian package on a Debian 12 that holds nothing else (debootstrap, variant minbase), and uses it there as
-# a user would: a study from a phantom to a pose, alone and under mpirun, then removes it. Needs root and Debian's mirror.
+# What a user meets who starts from nothing: on a Debian that holds nothing else (debootstrap, variant minbase), the two
+# commands of README.md from a clone of the last commit; then the Debian packages of that build, on a second such Debian.
+# Needs root, debootstrap, git and Debian's mirror.
 set -euo pipefail
+# shellcheck source-path=SCRIPTDIR
+source "$(dirname "${BASH_SOURCE[0]}")/../../jobs/lib.sh"
 
 usage() {
   cat <<'TEXT'
-Usage: tests/package/bare_debian.sh [--root DIR] PACKAGE.deb...
+Usage: tests/package/bare_debian.sh bookworm|trixie [--root DIR]
 
-  --root DIR    where the bare system is made; one that is there is used again      [a new folder, removed at the end]
-  AF_DEBIAN_MIRROR, in the environment: where its packages come from                [http://deb.debian.org/debian]
+Installs packages as root, and as a plain user runs jobs/local.sh and tests/run.sh and makes the Debian packages. These
+are installed on another bare system, used there (a study from a phantom to a pose, alone and under mpirun) and
+removed. Ends with one line per step, release, commit and date. From nothing it takes about an hour and a half on two
+cores, and 10 GB. Logs are in build/bare-RELEASE.
+
+  --root DIR    where the two systems are made; those that are there are used again  [a new folder, removed at the end]
+  AF_DEBIAN_MIRROR, in the environment: where packages come from                      [http://deb.debian.org/debian]
 TEXT
 }
 
-root="" packages=()
+release="" systems=""
 while (($# > 0)); do
   case "$1" in
-    --root) root=${2:?--root needs a folder}; shift ;;
+    bookworm | trixie) release=$1 ;;
+    --root) need_value "$1" $#; systems=$(realpath -m "$2"); shift ;;
     --help | -h) usage; exit 0 ;;
-    *.deb) packages+=("$(realpath "$1")") ;;
-    *) echo "bare_debian.sh: unknown argument '$1' (try --help)" >&2; exit 2 ;;
+    *) die 2 "unknown argument '$1' (try --help)" ;;
   esac
   shift
 done
-((${#packages[@]} > 0)) || { usage >&2; exit 2; }
-((EUID == 0)) || { echo "bare_debian.sh: debootstrap and chroot need root" >&2; exit 1; }
-command -v debootstrap >/dev/null || { echo "bare_debian.sh: debootstrap is not installed" >&2; exit 77; }
+[[ -n "$release" ]] || { usage >&2; exit 2; }
+((EUID == 0)) || die 1 "debootstrap and chroot need root"
+for tool in debootstrap git; do
+  command -v "$tool" >/dev/null || die 77 "$tool is not installed"
+done
 
-# Everything that is mounted goes with this process.
+# Whatever is mounted or started goes with this process.
 if [[ -z "${AF_IN_NAMESPACE:-}" ]]; then
-  AF_IN_NAMESPACE=1 exec unshare --mount --propagation private "$0" ${root:+--root "$root"} "${packages[@]}"
+  AF_IN_NAMESPACE=1 exec unshare --mount --pid --fork --kill-child --propagation private \
+    "$0" "$release" ${systems:+--root "$systems"}
 fi
 
-if [[ -z "$root" ]]; then
-  root=$(mktemp -d)
-  trap 'umount --recursive "$root/proc" "$root/dev" "$root/sys" || true; rm -rf --one-file-system "$root"' EXIT
+commit=$(git -C "$af_root" -c safe.directory='*' rev-parse --short=11 HEAD)
+logs="$af_root/build/bare-$release"
+mkdir -p "$logs"
+is_for_once=no
+if [[ -z "$systems" ]]; then
+  systems=$(mktemp -d)
+  is_for_once=yes
 fi
-mirror=${AF_DEBIAN_MIRROR:-http://deb.debian.org/debian}
-if [[ ! -e "$root/etc/debian_version" ]]; then
-  echo "--- a bare Debian 12 in $root"
-  debootstrap --variant=minbase bookworm "$root" "$mirror" >"$root.log" 2>&1 || { tail -n 20 "$root.log" >&2; exit 1; }
-fi
-mount -t proc proc "$root/proc"
-mount --rbind /dev "$root/dev"
-mount --rbind /sys "$root/sys"
-cp /etc/resolv.conf "$root/etc/resolv.conf"
-rm -rf "$root/packages"
-mkdir "$root/packages"
-cp "${packages[@]}" "$root/packages"
+source_system="$systems/source" package_system="$systems/package"
+clone="$source_system/home/guest/attenuation-fields"
 
-# inside SCRIPT [USER]: runs a script of the folder packages in the bare system.
-inside() {
-  chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin LC_ALL=C.UTF-8 DEBIAN_FRONTEND=noninteractive \
-    su "${2:-root}" -s /bin/bash -c "bash -euo pipefail /packages/$1"
+# --- steps -------------------------------------------------------------------------------------------------------
+
+steps=() status=0
+
+# step NAME COMMAND...: runs a command, its output in a log.
+step() {
+  local name=$1 log="$logs/${1//[ \/]/-}.log" start=$SECONDS
+  shift
+  say "--- $name"
+  if "$@" >"$log" 2>&1; then
+    steps+=("passed: $name, $(duration $((SECONDS - start)))")
+  else
+    steps+=("FAILED: $name, exit code $?")
+    status=1
+    tail -n 40 "$log" >&2
+    return 1
+  fi
 }
 
-cat >"$root/packages/install.sh" <<'TEXT'
-apt-get update -q
-apt-get install -y -q --no-install-recommends /packages/*.deb
-id guest >/dev/null 2>&1 || useradd --create-home guest
-TEXT
-cat >"$root/packages/look.sh" <<'TEXT'
-dpkg-query --show --showformat '${Package} ${Version} ${db:Status-Status}\n' attenuation-fields
-for program in precompute drr simulate register evaluate inspect; do
-  if ldd "/usr/bin/af-$program" | grep 'not found'; then exit 1; fi
-  zcat "/usr/share/man/man1/af-$program.1.gz" | head -n 1
-  bash -n "/usr/share/bash-completion/completions/af-$program"
-done
-for file in copyright LICENSE README.md docs/getting-started.md; do test -s "/usr/share/doc/attenuation-fields/$file"; done
-TEXT
-cat >"$root/packages/study.sh" <<'TEXT'
-rm -rf ~/trial
-mkdir ~/trial
-cd ~/trial
-field=(--study study/study.toml --uv-nodes 12 --st-nodes 96 --codewords 256)
-af-simulate --phantom spine --rig c-arm-12in -o study
-af-precompute "${field[@]}" --camera AP -o AP.af.h5
-mpirun -n 2 --oversubscribe af-precompute "${field[@]}" --camera LAT -o LAT.af.h5
-af-drr --field AP.af.h5 -o drr.png
-af-register --study study/study.toml --field AP=AP.af.h5 --field LAT=LAT.af.h5 --start-rotation-deg 1,-1,1 -o result
-if [[ -e /usr/lib/python3/dist-packages/attenuation_fields ]]; then
-  python3 -c "import attenuation_fields as af; print('Python: a DRR of shape', af.Field.open('AP.af.h5').drr(rotation_deg=(1, 0, 0)).shape)"
-fi
-af-inspect AP.af.h5 result/pose.toml | grep -E 'field|checksums|pose'
-/usr/libexec/attenuation-fields/slicer/af-register --xml >module.xml
-head -n 1 module.xml
-TEXT
-cat >"$root/packages/remove.sh" <<'TEXT'
-mapfile -t installed < <(dpkg-query --show --showformat '${Package}\n' '*attenuation-fields*')
-apt-get remove -y -q "${installed[@]}"
-if command -v af-drr; then exit 1; fi
-TEXT
+finish() {
+  (($? == 0)) || status=1
+  say ""
+  say "bare_debian.sh: $release ($(cat "$source_system/etc/debian_version")), commit $commit, $(date --utc --iso-8601)"
+  printf '  %s\n' "${steps[@]}"
+  if [[ "$is_for_once" == yes ]]; then
+    umount --recursive "$systems"/*/{proc,dev,sys} 2>/dev/null || true
+    rm -rf --one-file-system "$systems"
+  fi
+  exit "$status"
+}
 
-echo "--- install"
-inside install.sh >"$root/packages/install.log" 2>&1 || { tail -n 30 "$root/packages/install.log" >&2; exit 1; }
-inside look.sh
-echo "--- a study, as a user who is not root"
-inside study.sh guest
-echo "--- remove"
-inside remove.sh >"$root/packages/remove.log" 2>&1 || { tail -n 30 "$root/packages/remove.log" >&2; exit 1; }
-echo "bare_debian.sh: installed, used and removed"
+# make_bare SYSTEM: a Debian that holds nothing else, with a plain user.
+make_bare() {
+  mkdir -p "$1" &&
+    debootstrap --variant=minbase "$release" "$1" "${AF_DEBIAN_MIRROR:-http://deb.debian.org/debian}" &&
+    chroot "$1" useradd --create-home --shell /bin/bash guest
+}
+
+# enter SYSTEM: makes it, and makes it ready for commands.
+enter() {
+  [[ -e "$1/home/guest" ]] || step "bare system for the ${1##*/}" make_bare "$1"
+  mount -t proc proc "$1/proc"
+  mount --rbind /dev "$1/dev"
+  mount --rbind /sys "$1/sys"
+  cp /etc/resolv.conf "$1/etc/resolv.conf"
+}
+
+# inside SYSTEM USER FUNCTION: calls a function of this file there, in the user's home.
+inside() {
+  chroot "$1" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin LC_ALL=C.UTF-8 DEBIAN_FRONTEND=noninteractive \
+    su "$2" -c "$(declare -f "$3"); cd; set -euo pipefail; $3"
+}
+
+# --- what is done there ------------------------------------------------------------------------------------------
+
+put_clone() {
+  rm -rf "$clone" && mkdir -p "$clone" &&
+    git -C "$af_root" -c safe.directory='*' archive HEAD | tar -x -C "$clone" &&
+    chroot "$source_system" chown -R guest: /home/guest/attenuation-fields
+}
+install_what_builds() { /home/guest/attenuation-fields/jobs/install-packages.sh; }
+run_study() { cd attenuation-fields && jobs/local.sh; }
+run_tests() { cd attenuation-fields && tests/run.sh; }
+make_packages() { cd attenuation-fields && cmake --build build/release --target package; }
+
+install_ours() {
+  local program file
+  apt-get update -q
+  apt-get install -y -q --no-install-recommends /packages/*.deb
+  for program in precompute drr simulate scan register evaluate inspect; do
+    if ldd "/usr/bin/af-$program" | grep 'not found'; then exit 1; fi
+    zcat "/usr/share/man/man1/af-$program.1.gz" | grep -q "af-$program"
+    bash -n "/usr/share/bash-completion/completions/af-$program"
+  done
+  for file in copyright LICENSE README.md docs/getting-started.md; do
+    test -s "/usr/share/doc/attenuation-fields/$file"
+  done
+}
+use_ours() {
+  rm -rf trial
+  mkdir trial
+  cd trial
+  local field=(--study study/study.toml --uv-nodes 12 --st-nodes 96 --codewords 256)
+  af-simulate --phantom spine --rig c-arm-12in -o study
+  af-precompute "${field[@]}" --camera AP -o AP.af.h5
+  mpirun -n 2 --oversubscribe af-precompute "${field[@]}" --camera LAT -o LAT.af.h5
+  af-drr --field AP.af.h5 -o drr.png
+  af-register --study study/study.toml --field AP=AP.af.h5 --field LAT=LAT.af.h5 --start-rotation-deg 1,-1,1 -o result
+  python3 -c 'import attenuation_fields as af; print(af.Field.open("AP.af.h5").drr(rotation_deg=(1, 0, 0)).shape)'
+  af-inspect AP.af.h5 result/pose.toml
+  /usr/libexec/attenuation-fields/slicer/af-register --xml >module.xml
+  test -s module.xml
+}
+remove_ours() {
+  dpkg-query --show --showformat '${Package}\n' '*attenuation-fields*' | xargs apt-get remove -y -q
+  if command -v af-drr; then exit 1; fi
+}
+
+# --- all of it ---------------------------------------------------------------------------------------------------
+
+trap finish EXIT
+enter "$source_system"
+step "clone" put_clone
+step "packages that the build needs" inside "$source_system" root install_what_builds
+step "jobs/local.sh" inside "$source_system" guest run_study || true
+step "tests/run.sh" inside "$source_system" guest run_tests || true
+steps+=("        $(grep 'tests failed out of' "$logs/tests-run.sh.log" || echo "no test was run")")
+step "target package" inside "$source_system" guest make_packages
+
+enter "$package_system"
+rm -rf "$package_system/packages"
+mkdir "$package_system/packages"
+cp "$clone"/build/release/*.deb "$package_system/packages"
+step "our packages: install" inside "$package_system" root install_ours
+step "our packages: use" inside "$package_system" guest use_ours || true
+step "our packages: remove" inside "$package_system" root remove_ours
