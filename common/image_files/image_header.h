@@ -29,8 +29,6 @@ std::string foreign_content(const std::filesystem::path& path);
 /// Of axes from orthonormal, the cosine between two of them or the error of a length: what cosines
 /// of three decimals leave. A grid within it is taken as the nearest orthonormal one.
 inline constexpr double kMaxDirectionError = 1e-3;
-/// Two grids whose corners are nearer than this are one (as CTs are compared).
-inline constexpr double kSamePlaceMm = 1e-3;
 
 /// What can be said of an image file before a library is trusted with it.
 struct ImageHeader {

@@ -13,6 +13,7 @@
 #include "image_files/image_formats.h"
 #include "image_files/itk_image_io.h"
 #include "text/csv_table.h"
+#include "volume/ct_identity.h"
 
 namespace af::image_formats {
 

@@ -49,15 +49,21 @@ std::vector<std::string> unread_keys(const nlohmann::json& json) {
   return unread;
 }
 
-RigidTransform pose_of_toml(const std::string& text, const std::string& file) {
+std::vector<std::string> unread_keys(const toml::table& table) {
+  std::vector<std::string> unread;
+  for (const auto& [key, value] : table)
+    if (key != kPoseKey) unread.emplace_back(key.str());
+  return unread;
+}
+
+PosesInFile poses_of_toml(const std::string& text, const std::string& file) {
   const toml::table table = parse_toml(text, file);
   TomlProblems problems(file);
   TomlTableReader reader(table, "", problems);
   const auto pose = reader.get_pose(kPoseKey, Presence::Required);
-  reader.refuse_unknown_keys();
   problems.throw_if_any();
   check(pose.has_value(), "a pose without problems must be there");
-  return *pose;
+  return {{{1, *pose}}, notes_on(unread_keys(table), file)};
 }
 
 std::string matrix_column(int row, int column) {
@@ -164,7 +170,7 @@ bool is_toml_pose(const PoseFileBytes& file) {
 }
 
 PosesInFile read_toml_pose(const PoseFileBytes& file, const PoseContext& /*context*/) {
-  return {{{1, pose_of_toml(file.bytes, file.path.string())}}, {}};
+  return poses_of_toml(file.bytes, file.path.string());
 }
 
 std::string write_toml_pose(std::span<const RigidTransform> room_from_ct,

@@ -411,8 +411,10 @@ std::vector<PortfolioEnd> RegistrationRunner::Impl::portfolio_ends(std::int64_t 
     PortfolioEnd end;
     end.room_from_ct = chain.from_best_end ? ends.front().room_from_ct : start;
     end.chain = &chain;
+    const int evaluations_before = result.evaluations;
     run_chain(chain, begin, start_index, end, result);
-    end.similarity = judged(end.room_from_ct, result);
+    // Where nothing was searched, the start is no end.
+    if (result.evaluations > evaluations_before) end.similarity = judged(end.room_from_ct, result);
     if (std::isfinite(end.similarity)) {
       const auto worse = std::find_if(ends.begin(), ends.end(), [&](const PortfolioEnd& other) {
         return other.similarity < end.similarity;

@@ -18,6 +18,8 @@ using OptimizerHandle = std::unique_ptr<nlopt_opt_s, OptimizerDeleter>;
 
 /// The state of NLopt's callback. It keeps exceptions, which must not cross C code.
 struct Callback {
+  const OptimizationTarget& target;
+  double initial_step_mm;
   SearchRun& run;
   nlopt_opt optimizer;
   double worst_value;
@@ -29,7 +31,9 @@ struct Callback {
 double value_for_nlopt(unsigned /*count*/, const double* x, double* /*gradient*/, void* data) {
   auto& callback = *static_cast<Callback*>(data);
   try {
-    const ScaledParameters point = Eigen::Map<const ScaledParameters>(x);
+    const ScaledParameters wanted = Eigen::Map<const ScaledParameters>(x);
+    // Beyond known limits models see a smooth slope, down from the value at the limit, not a cliff.
+    const ScaledParameters point = callback.target.nearest_admissible(wanted);
     const SearchRun::Evaluation evaluation = callback.run.evaluate(point);
     if (evaluation.outcome == SearchRun::Outcome::Value) {
       const double value = evaluation.target.value;
@@ -39,7 +43,9 @@ double value_for_nlopt(unsigned /*count*/, const double* x, double* /*gradient*/
         callback.run.trace(0.0);
         callback.met_limit = false;
       }
-      return value;
+      const double steps_beyond = (wanted - point).norm() / callback.initial_step_mm;
+      return value -
+             (callback.run.result().value - callback.worst_value) * steps_beyond * steps_beyond;
     }
     if (evaluation.outcome == SearchRun::Outcome::Inadmissible) {
       callback.met_limit = true;
@@ -71,7 +77,8 @@ void NloptSearch::maximize(OptimizationTarget& target,
   const OptimizerHandle optimizer(nlopt_create(
       algorithm_ == NloptAlgorithm::Bobyqa ? NLOPT_LN_BOBYQA : NLOPT_LN_NELDERMEAD, 6));
   check(optimizer != nullptr, "NLopt gives an optimiser");
-  Callback callback{run, optimizer.get(), result.value, false, false, nullptr};
+  Callback callback{
+      target, options.initial_step_mm, run, optimizer.get(), result.value, false, false, nullptr};
   require_success(nlopt_set_max_objective(optimizer.get(), value_for_nlopt, &callback),
                   "NLopt takes an objective");
   require_success(nlopt_set_initial_step1(optimizer.get(), options.initial_step_mm),

@@ -68,7 +68,8 @@ void run(const PythonOptions& options) {
   const py::scoped_interpreter interpreter;
   const py::object module = py::module_::import("attenuation_fields");
   const py::object python_field = module.attr("Field").attr("open")(options.field);
-  const auto& field = python_field.cast<const attenuation_fields::Field&>();
+  const auto& field = static_cast<const attenuation_fields::Field&>(
+      python_field.cast<const attenuation_fields::Renderer&>());
   const auto poses = random_parameters(field);
   constexpr int kRepetitions = 1;
   const py::dict loops;

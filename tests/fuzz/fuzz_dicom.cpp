@@ -20,7 +20,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (!fuzz::is_accepted([&] { layout = dicom_pixel_layout(*elements); })) return 0;
   if (elements->has_compressed_pixels()) return 0;
   std::vector<double> pixels;
-  if (fuzz::is_accepted([&] { pixels = read_dicom_pixels(*layout); }))
+  if (fuzz::is_accepted([&] { pixels = read_dicom_pixels(*layout).values; }))
     fuzz::require(pixels.size() == static_cast<std::size_t>(layout->columns) *
                                        static_cast<std::size_t>(layout->rows),
                   "there is a value per pixel");

@@ -129,6 +129,7 @@ FieldFileInfo write(const CompressedAttenuationField& field,
 /// Runs `edit` on the file on rank 0.
 void edit_file(const std::filesystem::path& path, const std::function<void(hid_t)>& edit) {
   const Communicator world = Communicator::world();
+  world.barrier();  // HDF5 lets nobody write a file that another rank still reads
   if (world.is_root()) {
     const hdf5::Handle file = hdf5::open_file(path, H5F_ACC_RDWR);
     edit(file);

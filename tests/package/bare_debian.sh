@@ -112,9 +112,9 @@ inside() {
 put_clone() {
   rm -rf "$clone" && mkdir -p "$clone" &&
     git -C "$af_root" -c safe.directory='*' archive HEAD | tar -x -C "$clone" &&
-    chroot "$source_system" chown -R guest: /home/guest/attenuation-fields
+    chroot "$source_system" bash -c 'chown -R guest: ~guest/attenuation-fields'
 }
-install_what_builds() { /home/guest/attenuation-fields/jobs/install-packages.sh; }
+install_what_builds() { ~guest/attenuation-fields/jobs/install-packages.sh; }
 run_study() { cd attenuation-fields && jobs/local.sh; }
 run_tests() { cd attenuation-fields && tests/run.sh; }
 make_packages() { cd attenuation-fields && cmake --build build/release --target package; }

@@ -600,7 +600,7 @@ TEST_F(DrrProgram, RefusesASourceBehindOrWithinTheCt) {
 }
 
 TEST_F(DrrProgram, SaysThatAPoseIsBeyondTheRangeThatTheFieldStates) {
-  const std::string field = "--field " + path("AP.af.h5") + " -o " + path("beyond.mha");
+  const std::string field = "--field " + path("AP.af.h5") + " -o " + path("towards-source.mha");
   // Towards the source, where the field holds the rays of more than its 12 mm.
   const test::ProgramRun beyond = run_drr(field + " --translation-mm=0,13,0");
   EXPECT_EQ(beyond.exit_code, 0) << beyond.output;

@@ -195,7 +195,7 @@ TEST_F(SpectrumPrograms, RefuseBoneOfAnotherCt) {
       path("mixed.bone.af.h5"));
   expect_refused("af-drr --field " + path("mixed.af.h5") + kTube + " -o " + path("refused.mha"),
                  4,
-                 "the CT of the field beside it");
+                 "CT of the field: expected that of the field beside it");
 }
 
 TEST_F(SpectrumPrograms, EvaluationTakesTheTubeToo) {
