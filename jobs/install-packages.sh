@@ -31,14 +31,15 @@ slurm_packages=(slurm-wlm munge)
 
 usage() {
   cat <<'TEXT'
-Usage: jobs/install-packages.sh [--with-lint] [--with-benchmarks] [--with-slurm] [--with-torch] [--with-peers] [--check] [--help]
+Usage: jobs/install-packages.sh [--with-lint] [--with-benchmarks] [--with-slurm] [--with-torch]
+                                [--with-peers] [--check] [--help]
 
-Installs the packages that the project needs to build, run and pass its tests on Debian 12 (bookworm) or 13 (trixie).
-Says what it does; does nothing when all are there. Needs root or sudo only to install.
+Installs the packages that the project needs to build, run and pass its tests on Debian 12 (bookworm) or
+13 (trixie). Says what it does; does nothing when all are there. Needs root or sudo only to install.
 
-  --with-lint         also the formatter, the linters, the browser that checks reports, and what checks manual pages and
-                      completions (shellcheck, chromium, groff-base, bsdextrautils, zsh, and clang-format-14 and
-                      clang-tidy-14, which Debian 13 does not have)
+  --with-lint         also the formatter, the linters, the browser that checks reports, and what checks
+                      manual pages and completions (shellcheck, chromium, groff-base, bsdextrautils, zsh,
+                      and clang-format-14 and clang-tidy-14, which Debian 13 does not have)
   --with-benchmarks   also what tests/benchmark/run.sh compares with (plastimatch, Faiss, OpenBLAS)
   --with-slurm        also a Slurm of one node, for tests/slurm
   --with-torch        also PyTorch, for the test and the example of differentiable DRRs

@@ -12,16 +12,17 @@ usage() {
 Usage: jobs/local.sh [OPTIONS]
        jobs/local.sh STUDY.toml [OPTIONS]    a study of yours: see jobs/run-study.sh --help
 
-Installs what is missing, builds programs and Python module, and takes a CT through the whole pipeline: simulated X-ray pair, one attenuation
-field per camera, image quality of the fields, registrations by the presets paper and robust, report.html. Finished stages with unchanged inputs are
-skipped, so an interrupted run goes on where it stopped when the same command is run again.
+Installs what is missing, builds programs and Python module, and takes a CT through the whole pipeline: a
+simulated X-ray pair, one attenuation field per camera, image quality of the fields, registrations by the
+presets paper and robust, report.html. Stages that are finished and whose inputs did not change are
+skipped. So the same command goes on after an interruption.
 
   --output DIR              where everything goes                                        [./af-study]
   --ct PATH                 your CT: DICOM folder, NIfTI, MetaImage or NRRD      [a patient's skull CT]
   --series UID              DICOM series, when the folder of --ct holds several
   --phantom spine           a built-in phantom instead of a CT
-  --paper                   the paper's full range of translations (100 mm instead of 30 mm), 100 compared poses and
-                            10 ray-cast starts per interval
+  --paper                   the paper's full range of translations (100 mm instead of 30 mm),
+                            100 compared poses and 10 ray-cast starts per interval
   --starts-per-interval N   field registrations in each of the eight intervals of start error            [30]
   --raycast-starts N        how many of them, in each of the first two intervals, are repeated by ray casting
                             (with --paper by both presets, else by robust alone: by paper each takes a minute)
