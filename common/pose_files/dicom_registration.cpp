@@ -39,17 +39,19 @@ Eigen::Matrix4d matrix_of(const std::string& text, const std::string& where) {
 struct RegisteredFrame {
   std::string uid;
   RigidTransform registered_from_frame = RigidTransform::Identity();
+  bool has_matrix = false;
 };
 
 /// The matrices of an item are applied in their order.
 RegisteredFrame frame_of(const DicomItem& item, const std::string& where) {
-  RegisteredFrame frame{item.text(kFrameOfReference), RigidTransform::Identity()};
+  RegisteredFrame frame{item.text(kFrameOfReference)};
   for (const DicomItem& registration : item.items(kMatrixRegistrationSequence))
     for (const DicomItem& matrix : registration.items(kMatrixSequence)) {
       if (const std::string type = matrix.text(kMatrixType); type != "RIGID")
         throw InputError("matrix type", type, "must be RIGID", where);
       frame.registered_from_frame = rigid_or_throw(matrix_of(matrix.text(kMatrix), where), where) *
                                     frame.registered_from_frame;
+      frame.has_matrix = true;
     }
   return frame;
 }
@@ -99,13 +101,18 @@ PoseFrames pose_frames(const std::vector<RegisteredFrame>& frames,
                    uids_of(frames));
 }
 
-/// Every frame once.
-void require_distinct(const std::vector<RegisteredFrame>& frames, const std::string& file) {
-  for (std::size_t i = 0; i < frames.size(); ++i)
+/// Every frame once, and all but the object's own with a matrix.
+void check_frames(const std::vector<RegisteredFrame>& frames,
+                  const std::string& own_uid,
+                  const std::string& file) {
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    if (!frames[i].has_matrix && frames[i].uid != own_uid)
+      throw FileError(file, "has no matrix of the frame of reference " + frames[i].uid);
     for (std::size_t j = 0; j < i; ++j)
       if (frames[i].uid == frames[j].uid)
         throw InputError(file + ": registers a frame of reference twice; it has " +
                          uids_of(frames));
+  }
 }
 
 /// A UID of 120 bits of a hash (PS3.5, B.2), so that equal content has an equal UID.
@@ -191,7 +198,7 @@ PosesInFile read_dicom_registration(const PoseFileBytes& file, const PoseContext
   if (frames.empty()) throw FileError(name, "has no registration (0070,0308)");
   const std::string ct_uid =
       context.ct_frame_of_reference ? context.ct_frame_of_reference() : std::string();
-  require_distinct(frames, name);
+  check_frames(frames, own_uid, name);
   const PoseFrames pose = pose_frames(frames, own_uid, ct_uid, name);
   PosesInFile found{{{1, pose.room_from_ct()}}, {}};
   if (ct_uid.empty() || (pose.ct != nullptr && pose.ct->uid != ct_uid))
@@ -199,6 +206,10 @@ PosesInFile read_dicom_registration(const PoseFileBytes& file, const PoseContext
                           " is taken as the CT's, " +
                           (ct_uid.empty() ? "whose own is not known (--ct or --study states it)"
                                           : "which is " + ct_uid));
+  for (const RegisteredFrame& frame : frames)
+    if (&frame != pose.ct && &frame != pose.room)
+      found.notes.push_back(name + ": the matrix of the frame of reference " + frame.uid +
+                            " is not read: it is neither the CT's nor the object's own");
   return found;
 }
 

@@ -357,15 +357,16 @@ TEST_F(OtherPoses, ARegistrationsMatrixTakesTheCtToTheRoom) {
   EXPECT_EQ(bytes, pose_file_bytes("dicom", {&pose_, 1}, whole_context()));
 }
 
-/// A registration of the room and these frames: UID, matrix type, matrix.
+/// A registration of the room and these frames: UID, matrix type, matrix (or none).
 std::string registration(const std::string& room_uid,
                          const std::vector<std::array<std::string, 3>>& frames) {
   std::vector<std::vector<DicomElementToWrite>> items;
   for (const auto& [uid, type, matrix] : frames) {
     const std::vector<DicomElementToWrite> inner = {{{0x0070, 0x030c}, "CS", type, {}},
                                                     {{0x3006, 0x00c6}, "DS", matrix, {}}};
-    items.push_back({{{0x0020, 0x0052}, "UI", uid, {}},
-                     {{0x0070, 0x0309}, "SQ", "", {{{{0x0070, 0x030a}, "SQ", "", {inner}}}}}});
+    std::vector<std::vector<DicomElementToWrite>> matrices;
+    if (!matrix.empty()) matrices = {{{{0x0070, 0x030a}, "SQ", "", {inner}}}};
+    items.push_back({{{0x0020, 0x0052}, "UI", uid, {}}, {{0x0070, 0x0309}, "SQ", "", matrices}});
   }
   return dicom_file_bytes({{{0x0008, 0x0016}, "UI", "1.2.840.10008.5.1.4.1.1.66.1", {}},
                            {{0x0020, 0x0052}, "UI", room_uid, {}},
@@ -402,6 +403,14 @@ TEST_F(OtherPoses, WithoutTheCtsFrameTheOneTakenForItIsNamed) {
   EXPECT_THAT(found.notes, testing::ElementsAre(AllOf(HasSubstr("9.9"), HasSubstr("--ct"))));
 }
 
+TEST_F(OtherPoses, AFrameThatIsNeitherTheCtsNorTheRoomsIsNamed) {
+  const std::string identity = "1\\0\\0\\0\\0\\1\\0\\0\\0\\0\\1\\0\\0\\0\\0\\1";
+  const std::string moved = "1\\0\\0\\5\\0\\1\\0\\0\\0\\0\\1\\0\\0\\0\\0\\1";
+  const PosesInFile found =
+      read_all("r", registration("1.1", {{"1.2.3.4", "RIGID", identity}, {"9.9", "RIGID", moved}}));
+  EXPECT_THAT(found.notes, testing::ElementsAre(HasSubstr("9.9 is not read")));
+}
+
 TEST_F(OtherPoses, RegistrationsThatAreNotOneRigidPoseAreRefused) {
   const std::string identity = "1\\0\\0\\0\\0\\1\\0\\0\\0\\0\\1\\0\\0\\0\\0\\1";
   EXPECT_THAT(
@@ -414,6 +423,10 @@ TEST_F(OtherPoses, RegistrationsThatAreNotOneRigidPoseAreRefused) {
   EXPECT_THROW(read("r", registration("1.1", {{"1.2.3.4", "RIGID", "2" + identity.substr(1)}})),
                InputError);
   EXPECT_THROW(read("r", registration("1.1", {})), FileError);
+  EXPECT_THAT(message_of<FileError>([&] {
+                read("r", registration("1.1", {{"1.2.3.4", "RIGID", ""}, {"1.1", "RIGID", ""}}));
+              }),
+              HasSubstr("no matrix of the frame of reference 1.2.3.4"));
   // Registered to the CT, so that either may be the room.
   EXPECT_THAT(
       message_of<InputError>([&] {
