@@ -182,9 +182,8 @@ FoundPoses read_folder(const std::filesystem::path& folder, const PoseTableFrame
                                path.extension().string() + "; left out");
       continue;
     }
-    const bool is_mine =
-        name->first.empty() ? frames.is_only_case : name->first == frames.case_name;
-    if (!is_mine) continue;
+    if (name->first.empty()) require_only_case(path, frames);
+    if (!name->first.empty() && name->first != frames.case_name) continue;
     const RigidTransform pose = read_pose(path, frames.context, &found.problems);
     if (!found.room_from_ct.emplace(name->second, pose).second)
       found.problems.push_back(path.string() + ": start " + std::to_string(name->second) +

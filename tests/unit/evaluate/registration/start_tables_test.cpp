@@ -72,8 +72,6 @@ class TableOfPoses : public testing::Test {
     return frames;
   }
   const std::string pose_ = ",1,0,0,0,0,1,0,0,0,0,1,0\n";
-
- private:
   test::ScratchFolder folder_;
 };
 
@@ -86,6 +84,16 @@ TEST_F(TableOfPoses, StartsOfACaseThatTheStudyLacksAreRefused) {
                     [&] { read_starts(write(rows + name + ",1,1" + pose_), frames(), notes); }),
                 testing::AllOf(HasSubstr("t.csv:4: case = '" + std::string(name) + "'"),
                                HasSubstr("skull-01, skull-02")));
+}
+
+TEST_F(TableOfPoses, FilesOfAFolderNameTheirCaseWhereThereAreSeveral) {
+  test::write_input(folder_ / "skull-01-0.txt", "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");
+  test::write_input(folder_ / "1.txt", "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");
+  PoseTableFrames of = frames();
+  EXPECT_EQ(read_found_poses(folder_.path(), of).room_from_ct.size(), 2U);
+  of.is_only_case = false;
+  EXPECT_THAT(message_of<InputError>([&] { read_found_poses(folder_.path(), of); }),
+              HasSubstr("1.txt: does not say of which case"));
 }
 
 TEST_F(TableOfPoses, SecondsAreNotNegative) {
