@@ -67,9 +67,11 @@ class RadHeader {
 
  private:
   [[nodiscard]] const WordLine& line_of(std::string_view key) const {
-    const auto found = std::ranges::find_if(
-        lines_, [&](const WordLine& line) { return line.text.starts_with(key); });
+    const auto is_of_key = [&](const WordLine& line) { return line.text.starts_with(key); };
+    const auto found = std::ranges::find_if(lines_, is_of_key);
     if (found == lines_.end()) throw FileError(file_, "'" + std::string(key) + "' is missing");
+    if (std::find_if(found + 1, lines_.end(), is_of_key) != lines_.end())
+      throw FileError(file_, "'" + std::string(key) + "' is there twice");
     return *found;
   }
 

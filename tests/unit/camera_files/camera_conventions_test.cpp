@@ -784,6 +784,7 @@ TEST_F(CameraConventions, RadRefusals) {
               HasSubstr("from the detector to the source"));
   EXPECT_THAT(input_refusal(test::replaced(good, "0 0 -1 300", "0 0 -2 300")),
               HasSubstr("TPosition"));
+  EXPECT_THAT(file_refusal("Step[mm]: 1 1\n" + good), HasSubstr("'Step[mm]:' is there twice"));
   (void)read("Tilt[deg]: 3\n" + good);
   EXPECT_THAT(warnings(), testing::Contains(HasSubstr("not read: Tilt[deg]")));
 }
