@@ -250,33 +250,28 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-/// The unit of the last decimal that any of some numbers is written with; 0 when one has an
-/// exponent.
-double last_decimal(const std::vector<std::string>& numbers) {
-  std::size_t most = 0;
-  for (const std::string& number : numbers) {
-    if (number.find_first_of("eE") != std::string::npos) return 0.0;
-    const std::size_t point = number.find('.');
-    const std::size_t last = number.find_last_not_of("0 ");
-    if (point != std::string::npos && last != std::string::npos && last > point)
-      most = std::max(most, last - point);
-  }
-  return std::pow(10.0, -static_cast<double>(most));
+/// The unit of the last decimal that some numbers were rounded to: of 1, 0.1, ... Whatever computed
+/// with them since has left a trace of arithmetic.
+double last_decimal(const std::vector<double>& numbers) {
+  constexpr int kMostDecimals = 6;
+  constexpr double kArithmetic = 1e-3;
+  double per_unit = 1.0;
+  for (int decimals = 0; decimals < kMostDecimals; ++decimals, per_unit *= 10.0)
+    if (std::ranges::all_of(numbers, [&](double number) {
+          return std::abs(number * per_unit - std::round(number * per_unit)) < kArithmetic;
+        }))
+      break;
+  return 1.0 / per_unit;
 }
 
 /// How far rounding of the slices' positions may have moved a slice against the first and the last
 /// one: half of the last decimal, twice.
 double position_rounding_mm(const std::vector<Slice>& slices, const Eigen::Vector3d& normal) {
   double rounding = 0.0;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    std::vector<std::string> numbers;
-    for (const Slice& slice : slices) {
-      std::istringstream parts(slice.pixels.header.text({0x0020, 0x0032}));
-      std::string number;
-      for (std::size_t part = 0; part <= axis; ++part) std::getline(parts, number, '\\');
-      numbers.push_back(number);
-    }
-    rounding += std::abs(normal[static_cast<Eigen::Index>(axis)]) * last_decimal(numbers);
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    std::vector<double> numbers;
+    for (const Slice& slice : slices) numbers.push_back(slice.position_mm[axis]);
+    rounding += std::abs(normal[axis]) * last_decimal(numbers);
   }
   return rounding;
 }

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <array>
 #include <bit>
 #include <cmath>
 #include <initializer_list>
 #include <map>
 #include <optional>
 #include <sstream>
+#include <utility>
 
 #include "base/error.h"
+#include "base/number_text.h"
 #include "base/parsed_number.h"
 #include "image_files/file_bytes.h"
 #include "image_files/image_formats.h"
@@ -122,6 +125,15 @@ void read_meta_place(const TextHeader& text, ImageHeader& header) {
     throw InputError("DistanceUnits", "'" + *unit + "'", "lengths must be in mm", text.path);
 }
 
+/// InputError where values are not those that are stored; ITK reads them as if they were.
+void check_meta_intensity(const TextHeader& text) {
+  constexpr std::array<std::pair<const char*, double>, 2> kNone = {
+      {{"ElementToIntensityFunctionSlope", 1.0}, {"ElementToIntensityFunctionOffset", 0.0}}};
+  for (const auto& [key, none] : kNone)
+    if (const auto number = meta_numbers(text, {key}, 1); !number.empty() && number[0] != none)
+      throw InputError(key, *text.find(key), "must be " + number_text(none), text.path);
+}
+
 /// Whether the voxels are in the other byte order than this machine's.
 bool is_meta_byte_swapped(const TextHeader& header) {
   const bool binary = is_true(header, "BinaryDataByteOrderMSB", false);
@@ -172,6 +184,7 @@ ImageHeader read_meta_header(const fs::path& path) {
   const std::int64_t dimension = checked_dimension(text, "NDims");
   header.size = parse_sizes(text.path, text.require("DimSize"), dimension);
   read_meta_place(text, header);
+  check_meta_intensity(text);
   const std::int64_t channels = text.integer("ElementNumberOfChannels", 1);
   if (channels < 1 || channels > 1024)
     throw FileError(text.path, "ElementNumberOfChannels", "1 to 1024", std::to_string(channels));

@@ -159,6 +159,7 @@ std::optional<std::array<double, 3>> lps_signs(const std::string& space) {
     std::istringstream words(space);
     for (std::string word; std::getline(words, word, '-');) letters += word.substr(0, 1);
   }
+  if (letters.size() == 4 && letters.back() == 't') letters.pop_back();  // with an axis of time
   constexpr std::array<std::string_view, 3> kWays = {"lr", "pa", "si"};
   if (letters.size() != kWays.size()) return std::nullopt;
   std::array<double, 3> signs{};
@@ -199,9 +200,14 @@ void read_nrrd_place(const TextHeader& text, ImageHeader& header) {
   header.spacing_mm.resize(axes, 1.0);
   const std::string* const name = text.find("space");
   const std::string space = name == nullptr ? "" : lower(*name);
-  if (space.starts_with("3d-left-handed"))
-    throw InputError("space", *name, "must be right-handed, or left would become right", text.path);
   const auto signs = lps_signs(space);
+  if (!signs && !space.empty() && !space.starts_with("scanner-xyz") &&
+      !space.starts_with("3d-right-handed"))
+    throw InputError("space",
+                     *name,
+                     "must be along the patient's axes, such as LPS or right-anterior-superior, or "
+                     "right-handed: left would become right",
+                     text.path);
   header.has_orientation = signs.has_value() && !directions.empty();
   const std::string* const place = text.find("space origin");
   const auto origin = place == nullptr ? std::vector<double>(3) : nrrd_vector(*place);

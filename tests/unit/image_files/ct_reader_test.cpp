@@ -497,6 +497,12 @@ TEST(CtReader, PositionsThatWereRoundedAreThoseOfEvenSlices) {
   };
   std::vector<std::string> warnings;
   const CtVolume found = read_ct(series("tenths", 0.1, 99), {}, &warnings);
+  // What computing with the rounded ones leaves of them.
+  write_dicom_series(ct, folder / "traces", [&](int slice, test::DicomTestFile& file) {
+    const double z = std::round(6.25 * slice) / 10.0;
+    file.set_text({0x0020, 0x0032}, "DS", position(-31.25, 12.5, z) + "0000004");
+  });
+  EXPECT_NO_THROW((void)read_ct(folder / "traces"));
   // Half a tenth at either end of 24 slice distances.
   EXPECT_NEAR(found.grid.spacing_mm.z(), 0.625, 0.1 / 24);
   EXPECT_THAT(warnings, testing::ElementsAre(HasSubstr("within the rounding of")));
@@ -621,6 +627,14 @@ auto compressed_meta(int wrong_by, std::map<std::string, std::string> changes) {
   if (wrong_by != 0)
     changes["CompressedDataSize"] = std::to_string(static_cast<int>(bytes.size()) + wrong_by);
   return meta(changes, bytes);
+}
+
+/// "NRRD ... space: NAME" with axes along the space's own.
+std::string nrrd_in_space(const std::string& space) {
+  return "NRRD0004\ntype: short\ndimension: 3\n" + space +
+         "sizes: 4 3 2\nencoding: raw\nendian: little\n"
+         "space directions: (0.5,0,0) (0,0.75,0) (0,0,2)\nspace origin: (1.5,2.5,3.5)\n\n" +
+         bytes_of(small_voxels());
 }
 
 /// A NRRD of 4 x 3 x 2 voxels with these "space directions", and lines that follow them.
@@ -770,11 +784,13 @@ std::vector<BadCt> bad_cts() {
        kInput,
        "space units"},
       {"NrrdLeftHanded",
-       text_file("NRRD0004\ntype: short\ndimension: 3\nspace: 3D-left-handed\nsizes: 4 3 2\n"
-                 "encoding: raw\nendian: little\nspace directions: (1,0,0) (0,1,0) (0,0,1)\n\n" +
-                 bytes_of(small_voxels())),
+       text_file(nrrd_in_space("space: 3D-left-handed\n")),
        kInput,
        "space = 3D-left-handed"},
+      {"NrrdAxesInAnotherOrder",
+       text_file(nrrd_in_space("space: posterior-left-superior\n")),
+       kInput,
+       "space = posterior-left-superior"},
       {"NrrdOfColours",
        nrrd("(1,0,0) (0,1,0) (0,0,1)", "kinds: RGB-color domain domain\n"),
        kInput,
@@ -783,6 +799,14 @@ std::vector<BadCt> bad_cts() {
        nrrd("(1,0,0) (0,1,0) (0,0,1)", "space origin: (1,two,3)\n"),
        kInput,
        "space origin"},
+      {"MetaSlope",
+       meta({{"ElementToIntensityFunctionSlope", "2"}}),
+       kInput,
+       "ElementToIntensityFunctionSlope = 2: must be 1"},
+      {"MetaOffsetOfValues",
+       meta({{"ElementToIntensityFunctionSlope", "1"}, {"ElementToIntensityFunctionOffset", "-5"}}),
+       kInput,
+       "ElementToIntensityFunctionOffset = -5: must be 0"},
       {"MetaInMetres", meta({{"DistanceUnits", "m"}}), kInput, "DistanceUnits"},
       {"MetaTwoOrigins", meta({{"Position", "1 0 0"}}), kFile, "contradicts another key"},
       {"NrrdKeyTwice", nrrd("(1,0,0) (0,1,0) (0,0,1)", "encoding: gzip\n"), kFile, "stands twice"},
@@ -1071,14 +1095,6 @@ TEST(CtReader, TakesTheNearestUprightAxesInEveryFormat) {
   }
 }
 
-/// "NRRD ... space: NAME" with axes along the space's own.
-std::string nrrd_in_space(const std::string& space) {
-  return "NRRD0004\ntype: short\ndimension: 3\n" + space +
-         "sizes: 4 3 2\nencoding: raw\nendian: little\n"
-         "space directions: (0.5,0,0) (0,0.75,0) (0,0,2)\nspace origin: (1.5,2.5,3.5)\n\n" +
-         bytes_of(small_voxels());
-}
-
 TEST(CtReader, TurnsEverySpaceOfANrrdIntoLps) {
   struct Space {
     const char* name;
@@ -1092,6 +1108,7 @@ TEST(CtReader, TurnsEverySpaceOfANrrdIntoLps) {
                              Space{"space: left-anterior-superior\n", {1, -1, 1}, true},
                              Space{"space: las\n", {1, -1, 1}, true},
                              Space{"space: right-posterior-inferior\n", {-1, 1, -1}, true},
+                             Space{"space: right-anterior-superior-time\n", {-1, -1, 1}, true},
                              Space{"space: scanner-xyz\n", {1, 1, 1}, false},
                              Space{"space: 3D-right-handed\n", {1, 1, 1}, false},
                              Space{"space dimension: 3\n", {1, 1, 1}, false}}) {
