@@ -137,6 +137,7 @@ void bind_ct(py::module_& module) {
       [](const py::tuple& state) {
         return ct_of_array({state[0]}, {state[1]}, {state[2]}, {state[3]});
       }));
+  def_protocols(ct);
   def_copies(ct);
 }
 

@@ -2,6 +2,7 @@
 // What pickle and copy need: values by their members, what was opened or loaded by its arguments.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <map>
@@ -34,6 +35,15 @@ Value unpickled(const py::handle& state) {
     return state.cast<Value>();
 }
 
+/// pickle before protocol 2 would make an object of pybind11's base, which ends the process.
+template <typename Class>
+void def_protocols(Class& owner) {
+  owner.def("__reduce_ex__", [](const py::object& self, int protocol) {
+    const py::object object = py::module_::import("builtins").attr("object");
+    return object.attr("__reduce_ex__")(self, std::max(protocol, 2));
+  });
+}
+
 /// Pickles a struct as the tuple of these members.
 template <typename Value, typename... Members>
 void def_pickle(py::class_<Value>& owner, Members Value::*... members) {
@@ -46,6 +56,7 @@ void def_pickle(py::class_<Value>& owner, Members Value::*... members) {
                          ((value.*members = unpickled<Members>(state[next++])), ...);
                          return value;
                        }));
+  def_protocols(owner);
 }
 
 /// A `Base` with the named arguments of what made it.
