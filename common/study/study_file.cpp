@@ -317,6 +317,9 @@ void check_beams(TomlTableReader& reader,
     if (reader.has("nominal_room_from_ct"))
       reader.add_problem("nominal_room_from_ct",
                          problem + "; without this key center_ct_mm is put at the isocentre");
+    else if (study_case.landmarks_ct_mm.empty())
+      reader.add_problem("target_box_ct_mm",
+                         problem + "; center_ct_mm is what lies at the isocentre there");
     else
       reader.add_problem("target_box_ct_mm", problem);
     return;

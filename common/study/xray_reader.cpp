@@ -569,6 +569,7 @@ ViewXray read_view_xray(const StudyView& view, const CameraGeometry& camera) {
       take_negative_log(image, air_level(image, borders, field, view, note));
     if (view.reading.masks_borders) use_borders(borders, view, xray.mask, note);
   });
+  if (note.text().empty()) note.add("attenuation as the file has it");
   xray.note = note.text();
   return xray;
 }

@@ -253,6 +253,16 @@ void draw_view(const Study& study,
   pictures.files.push_back(path);
 }
 
+/// Whether a pose moves the target by too little from its nominal place to be seen.
+bool looks_nominal(const RigidTransform& room_from_ct, const StudyCase& study_case) {
+  constexpr double kUnseenMm = 0.01;
+  return std::ranges::all_of(
+      study_case.target_box_ct.corner_points(), [&](const Eigen::Vector3d& corner) {
+        return (room_from_ct * corner - study_case.nominal_room_from_ct * corner).norm() <
+               kUnseenMm;
+      });
+}
+
 }  // namespace
 
 StudyPictures draw_study_pictures(const Study& study,
@@ -266,7 +276,7 @@ StudyPictures draw_study_pictures(const Study& study,
   std::vector<ShownPose> poses = {{"nominal pose", study_case.nominal_room_from_ct}};
   if (has_landmarks(study_case)) {
     const LandmarkPose pose = landmark_pose(study, study_case);
-    if (pose.room_from_ct.isApprox(study_case.nominal_room_from_ct)) poses.clear();
+    if (looks_nominal(pose.room_from_ct, study_case)) poses.clear();
     poses.push_back({"pose of the landmarks", pose.room_from_ct});
     pictures.facts.push_back(residuals_text(pose, study_case));
   }

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "base/named_rows.h"
+#include "base/number_text.h"
 #include "register/similarity/cross_correlation.h"
 #include "register/similarity/difference_entropy.h"
 #include "register/similarity/gradient_correlation.h"
@@ -114,10 +115,9 @@ std::vector<std::string> problems(const SimilarityReference& reference) {
   }
   const ValueRange& range = reference.drr_range;
   if (!std::isfinite(range.low) || !std::isfinite(range.high) || !(range.high > range.low))
-    found.push_back("DRR range = [" + std::to_string(range.low) + ", " +
-                    std::to_string(range.high) +
-                    "]: must be finite and not empty (does the CT project into the region of "
-                    "interest at the nominal pose?)");
+    found.push_back("the region of interest of the DRR at the nominal pose is empty (" +
+                    number_text(range.low) + " to " + number_text(range.high) +
+                    "): the CT must project into it");
   return found;
 }
 

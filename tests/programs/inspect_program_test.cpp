@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <regex>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -342,6 +343,40 @@ TEST(AfInspect, DrawsPicturesOfACtAndOfAStudy) {
   EXPECT_THAT(run.output, testing::Not(HasSubstr("LOOK")));
   for (const char* name : {"AP", "LAT", "room", "ct", "ct-axial"})
     EXPECT_TRUE(fs::exists(folder / "pictures" / ("ellipsoids-" + std::string(name) + ".png")));
+}
+
+int png_width(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  file.seekg(16);
+  int width = 0;
+  for (int i = 0; i < 4; ++i) width = 256 * width + file.get();
+  return width;
+}
+
+// Marks so rough that the pose sought from the nominal one is this one only to rounding.
+TEST(AfInspect, DrawsOneDrrWhereRoughLandmarksGiveTheNominalPose) {
+  const ScratchFolder folder;
+  test::write_small_study(folder.path());
+  const std::string to = " --pictures " + (folder / "pictures").string();
+  const fs::path picture = folder / "pictures" / "ellipsoids-AP.png";
+  ASSERT_EQ(inspect((folder / "study.toml").string() + to).exit_code, 0);
+  const int width = png_width(picture);
+  Study study = read_study(folder / "study.toml");
+  StudyCase& only = study.cases[0];
+  only.landmarks_ct_mm = {{-30, 20, 10}, {25, -35, 30}, {5, 30, -30}};
+  for (StudyView& view : only.views) {
+    double off_px = 5.0;
+    for (const Eigen::Vector3d& point : only.landmarks_ct_mm)
+      view.landmarks_px.emplace_back(study.rig.camera(view.camera).project(point) +
+                                     Eigen::Vector2d(off_px *= -1.3, 4.0));
+  }
+  const std::regex nominal("nominal_room_from_ct = [^\n]*\n");
+  write_text_file(folder / "study.toml",
+                  std::regex_replace(study_to_toml(study, folder.path()), nominal, ""));
+  const test::ProgramRun run = inspect((folder / "study.toml").string() + to);
+  ASSERT_EQ(run.exit_code, 0) << run.output;
+  EXPECT_THAT(run.output, HasSubstr("(RMS): rough: "));
+  EXPECT_EQ(png_width(picture), width);
 }
 
 // The target and the CT's air are in the beam, its anatomy is 400 mm beside it.

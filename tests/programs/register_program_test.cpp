@@ -107,6 +107,7 @@ TEST_F(RegisterProgram, RegistersByFieldAndByRayCasting) {
   EXPECT_EQ(provenance.at("input_sha256").size(), 7U) << provenance;
   EXPECT_EQ(provenance.at("input_grids").at("ct").at("size_voxels"),
             nlohmann::json(test::five_ellipsoids().grid.size));
+  EXPECT_NE(provenance.at("input_notes").at("xray AP"), "");
 }
 
 TEST_F(RegisterProgram, LooksAFieldUpAsItIsMeantToBe) {

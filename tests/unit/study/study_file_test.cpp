@@ -368,6 +368,16 @@ TEST_F(StudyFile, WithoutANominalPoseTheCentreLiesAtTheIsocentre) {
   EXPECT_EQ(study_case.nominal_room_from_ct.linear(), Eigen::Matrix3d::Identity());
 }
 
+TEST_F(StudyFile, ATargetFarFromTheCentreAtTheIsocentreIsRefused) {
+  const std::regex nominal("nominal_room_from_ct = [^\n]*\n");
+  const std::string text =
+      replaced(kGoodStudy, "[[-30,-31,-32],[30,31,32]]", "[[-30,-31,-932],[30,31,-868]]");
+  EXPECT_THAT(message_of<InputError>([&] { read(std::regex_replace(text, nominal, "")); }),
+              AllOf(HasSubstr(path() + ":6: case[0].target_box_ct_mm = "),
+                    HasSubstr("in the beam of camera 'A', but it is projected to columns"),
+                    HasSubstr("; center_ct_mm is what lies at the isocentre there")));
+}
+
 TEST_F(StudyFile, ANominalPoseThatShowsNoneOfTheTargetIsRefused) {
   EXPECT_THAT(refusal("[[1,0,0,10]", "[[1,0,0,900]"),
               AllOf(HasSubstr(path() + ":5: case[0].nominal_room_from_ct = "),

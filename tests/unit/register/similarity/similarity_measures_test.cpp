@@ -328,6 +328,14 @@ TEST(GradientCorrelation, OfARampIsNothingByBothWays) {
   EXPECT_EQ(equations.gradient.norm(), 0.0);
 }
 
+TEST(SimilarityReference, OfAnEmptyDrrIsRefusedByName) {
+  SimilarityReference reference = reference_of(blobs());
+  reference.drr_range = {0.0, 0.0};
+  EXPECT_EQ(problems(reference),
+            std::vector<std::string>{"the region of interest of the DRR at the nominal pose is "
+                                     "empty (0 to 0): the CT must project into it"});
+}
+
 TEST(NormalizedMutualInformation, IsTwoForAnImageWithItself) {
   // The same bins for both: the DRR's range is the X-ray's.
   SimilarityReference reference = reference_of(blobs());
