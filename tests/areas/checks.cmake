@@ -15,8 +15,6 @@ af_add_check(options ${af_checks}/options.sh ${PROJECT_SOURCE_DIR})
 af_add_check(tree ${af_checks}/tree.sh ${PROJECT_SOURCE_DIR})
 af_add_check(links ${af_checks}/links.py ${PROJECT_SOURCE_DIR})
 af_add_check(links_self_test ${af_checks}/links.py --self-test)
-af_add_check(tables ${af_checks}/tables.py ${PROJECT_SOURCE_DIR})
-af_add_check(tables_self_test ${af_checks}/tables.py --self-test)
 af_add_check(rows ${af_checks}/rows.py ${PROJECT_SOURCE_DIR})
 af_add_check(rows_self_test ${af_checks}/rows.py --self-test)
 

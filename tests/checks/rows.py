@@ -16,9 +16,23 @@ import tempfile
 from pathlib import Path
 
 from links import outside_fences
-from tables import cells_of, pages_of
 
 LINK = re.compile(r"\]\(([\w./-]*data/[\w-]+\.csv)\)")
+
+
+def plain(cell):
+    """A cell's text without links and emphasis."""
+    return re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", cell).replace("**", "").strip()
+
+
+def cells_of(line):
+    return [plain(cell) for cell in re.split(r"(?<!\\)\|", line.strip().strip("|"))]
+
+
+def pages_of(root):
+    """Pages that publish measurements, by their paths below the root."""
+    patterns = ("*.md", "docs/*.md", "docs/howto/*.md", "*/README.md", "common/*/README.md")
+    return {page.relative_to(root).as_posix(): page for page in sorted({p for g in patterns for p in root.glob(g)})}
 
 
 def number(row, column):
