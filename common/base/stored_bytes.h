@@ -45,13 +45,6 @@ concept FixedMatrix = requires {
   0;
 };
 
-/// Texts that are stored as such but are no std::string.
-template <typename T>
-concept TextLike = requires(T& value, std::string_view text) {
-  value = text;
-  { value.text() } -> std::convertible_to<const std::string&>;
-};
-
 template <typename T>
 concept Optional = requires(T& value) {
   value.has_value();
@@ -72,8 +65,6 @@ class ByteWriter {
   void add(T& value) {
     if constexpr (StoredStruct<T>) {
       std::apply([this](auto&... member) { (add(member), ...); }, value.members());
-    } else if constexpr (TextLike<T>) {
-      add_list(value.text());
     } else if constexpr (std::is_arithmetic_v<T> || std::is_enum_v<T>) {
       add_raw(&value, sizeof(value));
     } else if constexpr (FixedMatrix<T>) {
@@ -119,10 +110,6 @@ class ByteReader {
   void take(T& value) {
     if constexpr (StoredStruct<T>) {
       std::apply([this](auto&... member) { (take(member), ...); }, value.members());
-    } else if constexpr (TextLike<T>) {
-      std::string text;
-      take_list(text);
-      value = text;
     } else if constexpr (std::is_same_v<T, bool>) {
       // Of a damaged record, a byte may be neither 0 nor 1, which no bool can hold.
       std::uint8_t byte = 0;

@@ -20,7 +20,6 @@
 #include "base/stored_bytes.h"
 #include "evaluate/methods/loaded_methods.h"
 #include "evaluate/outputs/row_gathering.h"
-#include "evaluate/registration/shared_measuring.h"
 #include "figures/picture.h"
 #include "files/output_file.h"
 #include "files/sha256.h"
@@ -91,28 +90,23 @@ std::optional<StartLimit> motion_limit(const std::vector<Method>& methods) {
   return std::nullopt;
 }
 
-/// Collective. Draws or reads a case's starts: on rank 0, which gets `notes` on what it read; the
-/// others share the work.
+/// Rank 0: draws or reads a case's starts, with `notes` on what it read.
 StratifiedStarts make_starts(const RegistrationStudyOptions& options,
                              const Study& study,
                              const StudyCase& study_case,
                              const Yardstick& yardstick,
                              const std::vector<Method>& methods,
-                             const Communicator& world,
                              std::vector<std::string>& notes) {
-  SharedStartMeasures measures(
-      world,
+  StartMeasures measures(
       start_frame(study_case, yardstick),
       options.start_options(),
       yardstick.points_ct_mm,
       [&](const RigidTransform& pose) { return is_admissible(methods, pose); },
       motion_limit(methods));
-  return starts_measured_together(world, measures, [&](StartMeasures& shared) {
-    if (!options.starts_from.empty())
-      return given_starts(options, study, study_case, yardstick, shared, notes);
-    if (options.start_rule == "within-range") return starts_within_range(shared);
-    return options.start_rule == "uniform" ? uniform_starts(shared) : stratified_starts(shared);
-  });
+  if (!options.starts_from.empty())
+    return given_starts(options, study, study_case, yardstick, measures, notes);
+  if (options.start_rule == "within-range") return starts_within_range(measures);
+  return options.start_rule == "uniform" ? uniform_starts(measures) : stratified_starts(measures);
 }
 
 /// Collective. Makes rank 0's starts known to every rank, held once per node: one copy per rank
@@ -256,13 +250,14 @@ void register_with(Method& method,
 }
 
 /// Rank 0: adds the rows of a method, by start index; returns its traces.
-FirstTraces add_rows(const MethodRows& method, FileBackedArray<RegistrationRow>& rows) {
+FirstTraces add_rows(const MethodRows& method, std::vector<RegistrationRow>& rows) {
   FirstTraces traces;
   const std::vector<std::int64_t>& indices = method.start_indices;
-  const std::span<RegistrationRow> mine = rows.append(indices.size());
+  const std::size_t first = rows.size();
+  rows.resize(first + indices.size());
   method.visit([&](std::int64_t index, TracedRow traced) {
     const auto place = std::lower_bound(indices.begin(), indices.end(), index);
-    mine[static_cast<std::size_t>(place - indices.begin())] = traced.row;
+    rows[first + static_cast<std::size_t>(place - indices.begin())] = std::move(traced.row);
     keep_if_first(index, std::move(traced.trace), traces);
   });
   return traces;
@@ -297,7 +292,7 @@ void announce_times(std::vector<Method>& methods,
       if (method.renderer == "field") {
         const RegistrationRow row = traced_row(method, start, index, yardstick).row;
         seconds = seconds_since(begin);
-        if (row.error != InternedText()) continue;
+        if (!row.error.empty()) continue;
         poses_tried = static_cast<double>(row.evaluations);
       } else {
         std::ignore = method.runner.similarity_at(start.room_from_ct);
@@ -407,7 +402,7 @@ void draw_overlays(const Method& method,
                                      {"which", which},
                                      {"camera", camera},
                                      {"slicer", slicer},
-                                     {"renderer", row.renderer.text()},
+                                     {"renderer", row.renderer},
                                      {"start_index", row.start_index},
                                      {"initial_tre_mm", row.initial_tre_mm},
                                      {"tre_mm", row.tre_mm}});
@@ -541,7 +536,7 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
                              const std::shared_ptr<registration::KeptFields>& kept_fields,
                              const Communicator& world,
                              const std::function<void(const CaseEvaluation&)>& on_starts,
-                             FileBackedArray<RegistrationRow>& all_rows) {
+                             std::vector<RegistrationRow>& all_rows) {
   CaseEvaluation evaluation;
   evaluation.case_name = study_case.name;
   std::optional<WorkNote> phase(
@@ -566,8 +561,12 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
     evaluation.gold = gold_standard(study, study_case, options.gold);
     return yardstick_of(study, study_case, evaluation.gold);
   });
-  evaluation.starts =
-      make_starts(options, study, study_case, yardstick, methods, world, evaluation.pose_problems);
+  evaluation.starts = all_or_none(world, [&] {
+    return world.is_root()
+               ? make_starts(
+                     options, study, study_case, yardstick, methods, evaluation.pose_problems)
+               : StratifiedStarts{};
+  });
   evaluation.starts.starts = held_per_node(evaluation.starts.starts, world);
   evaluation.start_count = evaluation.starts.starts.size();
   all_or_none(world, [&] {

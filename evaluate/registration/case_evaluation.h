@@ -14,7 +14,6 @@
 #include "evaluate/registration/start_tables.h"
 #include "evaluate/registration/yardstick.h"
 #include "evaluate/starts/perturbed_starts.h"
-#include "files/file_backed_array.h"
 #include "parallel/communicator.h"
 #include "register/method/registration.h"
 #include "run/run_folder.h"
@@ -80,6 +79,6 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
                              const std::shared_ptr<registration::KeptFields>& kept_fields,
                              const Communicator& world,
                              const std::function<void(const CaseEvaluation&)>& on_starts,
-                             FileBackedArray<RegistrationRow>& rows);
+                             std::vector<RegistrationRow>& rows);
 
 }  // namespace af::evaluation

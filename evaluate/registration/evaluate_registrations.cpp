@@ -498,13 +498,18 @@ void run_registration(const RegistrationStudyOptions& options,
     if (world.is_root()) starts_file.emplace(folder / "starts.csv");
   });
 
-  FileBackedArray<RegistrationRow> rows(folder);
+  std::vector<RegistrationRow> rows;
+  std::size_t start_count = 0;
   std::vector<CaseEvaluation> evaluations;
   const auto kept_fields = std::make_shared<registration::KeptFields>(
       cases, std::make_shared<ThreadPool>(thread_count(options.method.threads)));
   for (const StudyCase& study_case : cases) {
     const auto on_starts = [&](const CaseEvaluation& so_far) {
       if (!world.is_root()) return;
+      start_count += so_far.starts.starts.size();
+      if (start_count > kMostStarts)
+        throw InputError("starts = " + std::to_string(start_count) + ": a run takes at most " +
+                         std::to_string(kMostStarts));
       run.begin_results();
       starts_file->add(so_far.case_name, so_far.starts.starts.view());
       if (evaluations.size() + 1 == cases.size()) starts_file->finish();
@@ -536,10 +541,10 @@ void run_registration(const RegistrationStudyOptions& options,
                                evaluation.inputs.identities.end());
       provenance.input_notes.insert(evaluation.inputs.notes.begin(), evaluation.inputs.notes.end());
     }
-    write_registrations(folder / "registrations.csv", rows.view(), options.success_tre_mm);
+    write_registrations(folder / "registrations.csv", rows, options.success_tre_mm);
     write_traces(folder, evaluations);
-    draw_figures(options, rows.view());
-    const json summary = summary_json(options, study, evaluations, rows.view());
+    draw_figures(options, rows);
+    const json summary = summary_json(options, study, evaluations, rows);
     write_text_file(folder / "cases.csv", case_table(summary["renderers"]).to_text());
     write_text_file(folder / "starts-per-interval.csv",
                     drawn_starts_table(summary["cases"], summary["renderers"]).to_text());

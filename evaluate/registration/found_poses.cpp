@@ -45,7 +45,7 @@ CaseEvaluation evaluate_found_poses(const RegistrationStudyOptions& options,
                                     const Study& study,
                                     const StudyCase& study_case,
                                     const std::function<void(const CaseEvaluation&)>& on_starts,
-                                    FileBackedArray<RegistrationRow>& rows) {
+                                    std::vector<RegistrationRow>& rows) {
   CaseEvaluation evaluation;
   evaluation.case_name = study_case.name;
   evaluation.gold = gold_standard(study, study_case, options.gold);
@@ -64,14 +64,13 @@ CaseEvaluation evaluate_found_poses(const RegistrationStudyOptions& options,
       evaluation.pose_problems.end(), found.problems.begin(), found.problems.end());
   evaluation.start_count = evaluation.starts.starts.size();
   const auto count = static_cast<std::int64_t>(evaluation.start_count);
-  const std::span<RegistrationRow> mine = rows.append(evaluation.start_count);
   for (std::int64_t index = 0; index < count; ++index) {
     RegistrationRow row = found_row(found, index, yardstick);
     set_start(evaluation.starts.starts[static_cast<std::size_t>(index)], row);
     row.case_name = study_case.name;
     row.renderer = options.method_name;
     row.start_index = index;
-    mine[static_cast<std::size_t>(index)] = row;
+    rows.push_back(std::move(row));
   }
   for (const std::string& text : missing_pose_problems(study_case.name, found, count))
     evaluation.pose_problems.push_back(text);

@@ -16,6 +16,6 @@ CaseEvaluation evaluate_found_poses(const RegistrationStudyOptions& options,
                                     const Study& study,
                                     const StudyCase& study_case,
                                     const std::function<void(const CaseEvaluation&)>& on_starts,
-                                    FileBackedArray<RegistrationRow>& rows);
+                                    std::vector<RegistrationRow>& rows);
 
 }  // namespace af::evaluation

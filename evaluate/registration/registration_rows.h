@@ -12,7 +12,6 @@
 #include <tuple>
 #include <vector>
 
-#include "base/interned_text.h"
 #include "evaluate/registration/registration_errors.h"
 #include "evaluate/starts/perturbed_starts.h"
 #include "evaluate/statistics/success_rate.h"
@@ -36,13 +35,12 @@ struct TracePoint {
 };
 
 /// One registration as evaluated. Without an end pose (stop reasons of failed registrations)
-/// similarity, TRE and final parameters are NaN. Trivially copyable: millions are held in
-/// file-backed memory.
+/// similarity, TRE and final parameters are NaN.
 struct RegistrationRow {
   static constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 
-  InternedText case_name;
-  InternedText renderer;         ///< "field" or "raycast"
+  std::string case_name;
+  std::string renderer;          ///< "field" or "raycast"
   std::int64_t start_index = 0;  ///< row of the case's starts in starts.csv
   std::uint64_t draw_index = 0;
   int interval = 0;                      ///< of initial TRE
@@ -64,9 +62,9 @@ struct RegistrationRow {
   registration::UncertaintyReport uncertainty;
   double chain_distance_mm = kMissing;
   double squared_distance = kMissing;  ///< Mahalanobis, of the error by the covariance
-  InternedText stop_reason;
-  InternedText chain;    ///< whose end was taken
-  InternedText error;    ///< message of a registration that threw
+  std::string stop_reason;
+  std::string chain;     ///< whose end was taken
+  std::string error;     ///< message of a registration that threw
   double seconds = 0.0;  ///< wall time
 
   /// Of its case, and known where there is an end pose.
@@ -108,7 +106,10 @@ struct RegistrationRow {
   }
 };
 
-/// Some of many rows: a copy of millions would need too much memory.
+/// Most starts of a run, all of whose rows rank 0 holds.
+inline constexpr std::size_t kMostStarts = 1000000;
+
+/// Some of many rows.
 using RowPointers = std::vector<const RegistrationRow*>;
 
 /// A row, and for some failures how the search went (see failure_traces.h; empty for other rows).

@@ -227,7 +227,7 @@ std::vector<std::string> row_problems(std::span<const RegistrationRow> rows) {
   const RowPointers repeated = repeated_rows(rows);
   for (const RegistrationRow& row : rows) {
     const auto add = [&](const char* problem) {
-      found.push_back(row.case_name.text() + ", " + row.renderer.text() + ", start " +
+      found.push_back(row.case_name + ", " + row.renderer + ", start " +
                       std::to_string(row.start_index) + ": " + problem);
     };
     if (std::binary_search(repeated.begin(), repeated.end(), &row)) add("occurs more than once");

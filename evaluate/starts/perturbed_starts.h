@@ -96,8 +96,7 @@ struct UniformStart {
   [[nodiscard]] bool is_exhausted() const { return refused == kMostDraws; }
 };
 
-/// The computations on single draws or poses, which take nearly all of the time. For millions of
-/// starts a derived class shares them out and gives the same numbers.
+/// The computations on single draws or poses.
 class StartMeasures {
  public:
   /// The points must outlive it. Throws InputError for options that are not valid.
@@ -106,7 +105,6 @@ class StartMeasures {
                 std::span<const Eigen::Vector3d> target_points_ct_mm,
                 IsAdmissible is_admissible,
                 std::optional<StartLimit> limit = std::nullopt);
-  virtual ~StartMeasures() = default;
   StartMeasures(const StartMeasures&) = delete;
   StartMeasures& operator=(const StartMeasures&) = delete;
 
@@ -123,13 +121,13 @@ class StartMeasures {
   [[nodiscard]] PoseParameters stratified_draw(std::uint64_t draw_index) const;
 
   /// In order.
-  virtual std::vector<DrawVerdict> judge_draws(IndexRange draws);
+  std::vector<DrawVerdict> judge_draws(IndexRange draws);
   /// Mean TREs against the gold pose, in the order of the poses.
-  virtual std::vector<double> tres_mm(std::span<const RigidTransform> room_from_ct);
+  std::vector<double> tres_mm(std::span<const RigidTransform> room_from_ct);
   /// In order. When a start is exhausted, nothing is drawn after it.
-  virtual std::vector<UniformStart> draw_uniform(IndexRange starts);
+  std::vector<UniformStart> draw_uniform(IndexRange starts);
   /// The same for starts_within_range(), which needs a limit.
-  virtual std::vector<UniformStart> draw_within_range(IndexRange starts);
+  std::vector<UniformStart> draw_within_range(IndexRange starts);
 
  private:
   [[nodiscard]] int interval_of_draw(const RigidTransform& room_from_ct) const;

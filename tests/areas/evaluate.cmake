@@ -47,7 +47,6 @@ af_add_program_tests(
   LABELS programs mpi
   TIMEOUT 1800)
 
-af_add_mpi_test(shared_measuring_test SOURCES mpi/shared_measuring_test.cpp LIBS af_evaluation_program RANKS 1 2 3 4)
 
 # Of all programs: whoever builds these tests has every library of options.
 af_add_test(

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 af_add_test(
   files_test
-  SOURCES unit/files/file_backed_array_test.cpp unit/files/input_guard_test.cpp unit/files/output_file_test.cpp unit/files/output_lock_test.cpp
+  SOURCES unit/files/input_guard_test.cpp unit/files/output_file_test.cpp unit/files/output_lock_test.cpp
           unit/files/partial_folder_test.cpp unit/files/sha256_test.cpp
   LIBS af_files af_text)

@@ -9,8 +9,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "base/interned_text.h"
-
 namespace af {
 namespace {
 
@@ -27,14 +25,13 @@ struct Outer {
   bool is_set = false;
   Colour colour = Colour::Red;
   std::string text;
-  InternedText name;
   std::array<double, 3> numbers{};
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   std::vector<Inner> list;
   std::optional<Inner> given;
   std::optional<Inner> missing;
   auto members() {
-    return std::tie(large, is_set, colour, text, name, numbers, pose, list, given, missing);
+    return std::tie(large, is_set, colour, text, numbers, pose, list, given, missing);
   }
 };
 
@@ -44,7 +41,6 @@ Outer example() {
   outer.is_set = true;
   outer.colour = Colour::Green;
   outer.text = std::string("a\0b", 3);
-  outer.name = "skull";
   outer.numbers = {std::nan(""), -0.0, std::numeric_limits<double>::denorm_min()};
   outer.pose.translate(Eigen::Vector3d(1.0, 2.0, 1.0 / 3));
   outer.list = {{1, {}}, {2, {std::numeric_limits<double>::infinity(), 5.0}}};
@@ -58,7 +54,6 @@ TEST(StoredBytes, KeepEveryBitOfEveryMember) {
   EXPECT_TRUE(back.is_set);
   EXPECT_EQ(back.colour, Colour::Green);
   EXPECT_EQ(back.text, std::string("a\0b", 3));
-  EXPECT_EQ(back.name, "skull");
   EXPECT_TRUE(std::isnan(back.numbers[0]));
   EXPECT_TRUE(std::signbit(back.numbers[1]));
   EXPECT_EQ(back.numbers[2], std::numeric_limits<double>::denorm_min());
