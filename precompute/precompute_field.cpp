@@ -454,16 +454,13 @@ class PrecomputeRun {
   [[nodiscard]] FieldFileInfo write_output(const Codebook& codebook,
                                            const NextBlocks& next_blocks,
                                            const MakeProvenance& make_provenance) const {
-    const IndexPacking packing =
-        options_.packs_by_codebook_tree() ? IndexPacking::CodebookTree : IndexPacking::Deflate;
     AttenuationAtlas atlas{identity_of(source_, source_.range), {}, quantizer().step(), codebook};
     for (const FieldPart& part : parts_)
       atlas.members.push_back({identity_of(part.source, part.range), part.light_slab});
     if (options_.is_atlas())
-      return write_atlas(
-          atlas, next_blocks, make_provenance, options_.output, world_, hints(), packing);
+      return write_atlas(atlas, next_blocks, make_provenance, options_.output, world_, hints());
     return write_field(
-        atlas.field(0), next_blocks, make_provenance, options_.output, world_, hints(), packing);
+        atlas.field(0), next_blocks, make_provenance, options_.output, world_, hints());
   }
 
   /// Collective.

@@ -16,12 +16,6 @@ struct FieldProvenance {
   std::string provenance_json;
 };
 
-/// Lossless packing of the indices in the file; it does not change the payload.
-enum class IndexPacking {
-  CodebookTree,  ///< by IndexCoding; needs these programs to be read
-  Deflate,       ///< by HDF5's shuffle and deflate; any reader of HDF5 can, and older programs
-};
-
 struct FieldFileInfo {
   FieldProvenance provenance;
   std::string payload_sha256;  ///< over the named datasets in fixed order
@@ -30,7 +24,6 @@ struct FieldFileInfo {
   /// The look-up for DRRs that the field's options name: "linear", also when they name none, or
   /// "cubic".
   std::string look_up = "linear";
-  IndexPacking packing = IndexPacking::CodebookTree;
 };
 
 }  // namespace af

@@ -13,7 +13,6 @@
 #include "base/stored_bytes.h"
 #include "field_file/hdf5_calls.h"
 #include "field_file/index_dataset.h"
-#include "field_file/index_filter.h"
 #include "files/input_file.h"
 #include "files/input_guard.h"
 
@@ -23,49 +22,25 @@ namespace {
 using hdf5::checked;
 using hdf5::Handle;
 
-/// Deflate shrinks nothing by more than this, and IndexCoding by less.
+/// Deflate shrinks nothing by more than this.
 constexpr std::uint64_t kMaxPackingRatio = 1032;
 
-/// What a file's version and attributes say of its indices.
-struct StoredCoding {
-  IndexPacking packing = IndexPacking::CodebookTree;
-  CodebookParts codebook;
-};
-
-/// A text attribute that a version asks for, one of `known`.
-std::string required_attribute(hid_t file,
-                               const char* name,
-                               const std::vector<std::string>& known,
-                               const std::filesystem::path& path) {
-  std::string found = H5Aexists(file, name) > 0 ? hdf5::read_text_attribute(file, name) : "none";
-  for (const std::string& text : known)
-    if (found == text) return found;
-  std::string expected = known.front();
-  for (std::size_t i = 1; i < known.size(); ++i) expected += " or " + known[i];
-  throw FileError(path.string(), std::string("attribute ") + name, expected, found);
-}
-
-StoredCoding checked_coding(hid_t file, const std::filesystem::path& path) {
+void check_version(hid_t file, const std::filesystem::path& path) {
   const int version = hdf5::read_int_attribute(file, "format_version");
-  if (version < 1 || version > kFormatVersion)
+  if (version != kFormatVersion)
     throw FileError(path.string(),
                     "attribute format_version",
-                    "1 to " + std::to_string(kFormatVersion),
+                    std::to_string(kFormatVersion) + " (af-precompute makes the field anew)",
                     std::to_string(version));
-  if (version < kFormatVersionWithMeans)
-    return {version == format_version_of(IndexPacking::Deflate, {}) ? IndexPacking::Deflate
-                                                                    : IndexPacking::CodebookTree,
-            {}};
-  const bool has_filter = version >= kFormatVersionWithFilter;
-  std::vector<std::string> codings = {kMeanRemoved};
-  if (has_filter) codings.emplace_back(kPlainTiles);
-  const bool has_means =
-      required_attribute(file, kTileCodingAttribute, codings, path) == kMeanRemoved;
-  const char* const deflate = to_string(IndexPacking::Deflate);
-  const std::string packing = required_attribute(
-      file, kPackingAttribute, {to_string(IndexPacking::CodebookTree), deflate}, path);
-  return {packing == deflate ? IndexPacking::Deflate : IndexPacking::CodebookTree,
-          {has_means, has_filter}};
+}
+
+bool has_object(hid_t file, const std::string& name) {
+  return checked(H5Lexists(file, name.c_str(), H5P_DEFAULT), "H5Lexists") > 0;
+}
+
+CodebookParts read_codebook_parts(hid_t file) {
+  if (!has_object(file, "/codebook")) return {};
+  return {has_object(file, kMeanStepDataset), has_object(file, kTileFilterDataset)};
 }
 
 /// Whether a file of this size can hold so many indices at all; refuses before memory is asked for.
@@ -82,22 +57,6 @@ void check_plausible_size(const DatasetRule& rule,
                     "a file of " + std::to_string(file_bytes));
 }
 
-/// Checks that a file's version and its indices agree on how they are packed.
-void check_packing(hid_t dataset,
-                   const DatasetRule& rule,
-                   IndexPacking packing,
-                   const CodebookParts& parts,
-                   const std::filesystem::path& path) {
-  hdf5::ChunkShape chunk{};
-  const auto text = [&](IndexPacking of) {
-    if (parts.has_means || parts.has_filter) return std::string(to_string(of));
-    return "indices packed as in version " + std::to_string(format_version_of(of, parts));
-  };
-  const IndexPacking found =
-      hdf5::is_coded(dataset, chunk) ? IndexPacking::CodebookTree : IndexPacking::Deflate;
-  if (found != packing) throw FileError(path.string(), rule.name, text(packing), text(found));
-}
-
 std::vector<Dataset> read_datasets(hid_t file,
                                    const std::vector<DatasetRule>& rules,
                                    const std::string& path) {
@@ -109,8 +68,7 @@ std::vector<Dataset> read_datasets(hid_t file,
 
 /// Of a group, "" for the root; none where the file has none.
 std::vector<Dataset> read_range(hid_t file, const std::string& group, const std::string& path) {
-  if (checked(H5Lexists(file, (group + "/range").c_str(), H5P_DEFAULT), "H5Lexists") <= 0)
-    return {};
+  if (!has_object(file, group + "/range")) return {};
   return read_datasets(file, within(group, range_rules()), path);
 }
 
@@ -134,15 +92,13 @@ FieldHeader read_field_of(hid_t file,
   header.payload.insert(header.payload.end(), shared.begin(), shared.end());
   header.range = read_range(file, group, path.string());
   const DatasetRule material = of_group({material_rule()}).front();
-  if (checked(H5Lexists(file, material.name.c_str(), H5P_DEFAULT), "H5Lexists") > 0)
+  if (has_object(file, material.name))
     header.material.push_back(hdf5::read_dataset(file, material, path.string()));
   header.index_rules = of_group(index_rules(header.field(path.string())));
   for (const DatasetRule& rule : header.index_rules) {
     check_plausible_size(rule, of_file.file_bytes, path);
-    std::vector<std::uint64_t> extents;
-    const Handle dataset = hdf5::open_dataset(file, rule, path.string(), extents);
-    check_packing(dataset, rule, of_file.packing, of_file.codebook, path);
-    header.index_sha256.push_back(hdf5::read_text_attribute(dataset, "sha256"));
+    const hdf5::StoredTiles tiles(file, rule, path.string());
+    header.index_sha256.push_back(hdf5::stated_sha256(file, rule.name));
   }
   return header;
 }
@@ -200,9 +156,8 @@ FileHeader read_header(const std::filesystem::path& path) {
   const Handle file = hdf5::open_file(path, H5F_ACC_RDONLY);
   FileHeader header;
   header.is_atlas = is_atlas_format(file, path);
-  const StoredCoding coding = checked_coding(file, path);
-  header.packing = coding.packing;
-  header.codebook = coding.codebook;
+  check_version(file, path);
+  header.codebook = read_codebook_parts(file);
   header.file_bytes = std::filesystem::file_size(path);
   if (header.is_atlas)
     read_members(file, path, header);
@@ -310,8 +265,7 @@ FieldFileInfo info_of(const FileHeader& header,
           header.payload_sha256,
           header.file_bytes,
           payload_bytes,
-          look_up_of(provenance, path.string()),
-          header.packing};
+          look_up_of(provenance, path.string())};
 }
 
 }  // namespace af::field_layout

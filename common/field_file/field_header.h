@@ -38,19 +38,11 @@ struct FileHeader {
   std::vector<Dataset> provenance;
   std::string payload_sha256;
   std::uint64_t file_bytes = 0;
-  IndexPacking packing = IndexPacking::CodebookTree;
   CodebookParts codebook;
 
   auto members() {
-    return std::tie(is_atlas,
-                    fields,
-                    root,
-                    root_range,
-                    provenance,
-                    payload_sha256,
-                    file_bytes,
-                    packing,
-                    codebook);
+    return std::tie(
+        is_atlas, fields, root, root_range, provenance, payload_sha256, file_bytes, codebook);
   }
   /// Of an atlas. FileError.
   [[nodiscard]] AttenuationAtlas atlas(const std::string& path) const;

@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/file_name.h"
+#include "field_file/field_writing.h"
 #include "files/sha256.h"
 
 namespace af::field_layout {
@@ -31,11 +32,11 @@ DatasetRule codewords_rule() {
 }
 
 DatasetRule mean_step_rule() {
-  return {"/codebook/mean_step", ElementType::Int32, {1}, false, "level", "none"};
+  return {kMeanStepDataset, ElementType::Int32, {1}, false, "level", "none"};
 }
 
 DatasetRule tile_filter_rule() {
-  return {"/codebook/tile_filter",
+  return {kTileFilterDataset,
           ElementType::Float32,
           {kTileElements, kFilterInputs},
           false,
@@ -76,9 +77,8 @@ StoredValues stored_values(LightSlab& planes) {
   return values;
 }
 
-/// An identity as files hold it. Two numbers state the motion range, which older programs read,
-/// too. Of a range that two numbers cannot state (range_rules()), they hold the largest part that
-/// they can.
+/// An identity as files hold it. Two numbers state the motion range; of a range that two numbers
+/// cannot state (range_rules()), the largest part that they can.
 struct StoredIdentity {
   FieldIdentity identity;
   double max_rotation_rad = 0.0;
@@ -173,12 +173,12 @@ void set_codebook(std::span<const Dataset> datasets,
                   Codebook& codebook) {
   check(datasets.size() >= shared_rules({}), "a dataset per rule");
   for (const Dataset& more : datasets.subspan(shared_rules({}))) {
-    if (more.rule.name == mean_step_rule().name) {
+    if (more.rule.name == kMeanStepDataset) {
       codebook.mean_step = values_of<std::int32_t>(more, path).at(0);
       if (!codebook.has_means())
         throw FileError(path, more.rule.name, "at least 1", std::to_string(codebook.mean_step));
     } else {
-      check(more.rule.name == tile_filter_rule().name, "a rule of a codebook");
+      check(more.rule.name == kTileFilterDataset, "a rule of a codebook");
       const auto weights = values_of<float>(more, path);
       check(weights.size() == kTileElements * kFilterInputs, "a weight of every input");
       codebook.filter.emplace();
@@ -275,8 +275,24 @@ std::vector<DatasetRule> index_rules(const CompressedAttenuationField& field) {
   return index_rules(field.lattice(), field.codebook.has_means());
 }
 
-const char* to_string(IndexPacking packing) {
-  return packing == IndexPacking::CodebookTree ? "codebook-tree" : "deflate";
+DatasetRule codewords_rule(const DatasetRule& tiles) {
+  DatasetRule rule = tiles;
+  rule.name += "/codewords";
+  rule.extents[2] /= tiles.rows_per_tile;
+  rule.units = "codeword";
+  rule.frame = "tiles (u, v, s, t)";
+  rule.rows_per_tile = 1;
+  return rule;
+}
+
+DatasetRule means_rule(const DatasetRule& tiles) {
+  DatasetRule rule = codewords_rule(tiles);
+  rule.name = tiles.name + "/means";
+  std::swap(rule.extents[2], rule.extents[3]);
+  rule.units = "level";
+  rule.frame = "tiles (u, v, t, s); along t differences, but every " +
+               std::to_string(kMeanRunTiles) + "th the level itself";
+  return rule;
 }
 
 DatasetRule material_rule() {

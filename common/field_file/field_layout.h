@@ -17,12 +17,7 @@
 namespace af::field_layout {
 
 inline constexpr const char* kFormat = "attenuation-field";
-/// Version 2 has indices that IndexPacking::CodebookTree coded; else it is as version 1. Version 3
-/// has mean-removed tiles, packed either way, and says so in its attribute tile_coding. Version 4
-/// has a tile filter, and tiles of either kind.
-inline constexpr int kFormatVersion = 4;
-inline constexpr int kFormatVersionWithMeans = 3;
-inline constexpr int kFormatVersionWithFilter = 4;
+inline constexpr int kFormatVersion = 5;
 
 /// What a codebook has beside its codewords.
 struct CodebookParts {
@@ -32,19 +27,10 @@ struct CodebookParts {
   auto members() { return std::tie(has_means, has_filter); }
 };
 CodebookParts parts_of(const Codebook& codebook);
+/// The datasets that a file has for these parts alone.
+inline constexpr const char* kMeanStepDataset = "/codebook/mean_step";
+inline constexpr const char* kTileFilterDataset = "/codebook/tile_filter";
 
-inline constexpr int format_version_of(IndexPacking packing, const CodebookParts& parts) {
-  if (parts.has_filter) return kFormatVersionWithFilter;
-  if (parts.has_means) return kFormatVersionWithMeans;
-  return packing == IndexPacking::CodebookTree ? 2 : 1;
-}
-/// Attributes of files from version 3 on: "mean-removed" or, from version 4 on, "plain"; and
-/// "codebook-tree" or "deflate".
-inline constexpr const char* kTileCodingAttribute = "tile_coding";
-inline constexpr const char* kMeanRemoved = "mean-removed";
-inline constexpr const char* kPlainTiles = "plain";
-inline constexpr const char* kPackingAttribute = "index_packing";
-const char* to_string(IndexPacking packing);
 inline constexpr const char* kAtlasFormat = "attenuation-atlas";
 inline constexpr int kMaxSlabs = 64;
 inline constexpr int kMaxMembers = 64;
@@ -67,6 +53,12 @@ DatasetRule slab_count_rule();
 DatasetRule index_rule(const FieldLattice& lattice, std::size_t slab, bool has_means);
 /// One per slab.
 std::vector<DatasetRule> index_rules(const FieldLattice& lattice, bool has_means);
+/// What a file holds of the numbers that index_rule() describes, in the group of that name.
+DatasetRule codewords_rule(const DatasetRule& tiles);
+/// Where tiles have means (rows_per_tile). Smooth along t, they are stored as differences from
+/// their predecessors along t, modulo 2^16, but every kMeanRunTiles-th one as it is. t is slower
+/// than s, so that neighbouring bytes resemble each other.
+DatasetRule means_rule(const DatasetRule& tiles);
 std::vector<DatasetRule> index_rules(const CompressedAttenuationField& field);
 std::vector<DatasetRule> provenance_rules();
 
@@ -100,8 +92,7 @@ std::vector<Dataset> datasets_of(const FieldProvenance& provenance);
 std::vector<Dataset> geometry_datasets(const LightSlab& light_slab);
 
 /// Datasets beside the payload for a motion range that two numbers cannot state; none for other
-/// ranges. Older programs ignore them and read symmetric_part() of the range, all of which the
-/// field covers.
+/// ranges.
 std::vector<Dataset> range_datasets(const MotionRange& range);
 std::vector<DatasetRule> range_rules();
 /// The range of such datasets. FileError when it is no range or contradicts the two numbers that
@@ -110,8 +101,7 @@ MotionRange range_of(std::span<const Dataset> datasets,
                      const MotionRange& stated,
                      const std::string& path);
 
-/// The dataset beside the payload that marks a field of bone alone; none for other fields. Older
-/// programs ignore it.
+/// The dataset beside the payload that marks a field of bone alone; none for other fields.
 std::vector<Dataset> material_datasets(FieldMaterial material);
 DatasetRule material_rule();
 /// FileError when it names no material that a field has.

@@ -2,7 +2,6 @@
 #include "field_file/field_reading.h"
 
 #include <algorithm>
-#include <optional>
 #include <span>
 
 #include "base/error.h"
@@ -11,7 +10,6 @@
 #include "field_file/field_layout.h"
 #include "field_file/hdf5_calls.h"
 #include "field_file/index_dataset.h"
-#include "field_file/index_filter.h"
 #include "files/reading_turn.h"
 #include "files/sha256.h"
 
@@ -28,7 +26,6 @@ using field_layout::read_header_of;
 using field_layout::shared_header;
 using hdf5::Handle;
 using hdf5::naming_file;
-using hdf5::read_planes;
 
 /// Reads and verifies the indices of one slab into memory for all of them.
 void read_indices(const std::filesystem::path& path,
@@ -37,21 +34,17 @@ void read_indices(const std::filesystem::path& path,
                   const Codebook& codebook,
                   std::span<std::uint16_t> indices) {
   const Handle file = hdf5::open_file(path, H5F_ACC_RDONLY);
-  std::vector<std::uint64_t> extents;
-  const Handle dataset = hdf5::open_dataset(file, rule, path.string(), extents);
+  const hdf5::StoredTiles tiles(file, rule, path.string());
   const std::size_t plane = indices.size() / rule.extents[0];
   Sha256 sha256;
   std::vector<std::string> found;
-  read_planes(
-      dataset,
-      rule,
-      [&](std::uint64_t u, std::uint64_t count) {
-        return indices.subspan(u * plane, count * plane);
-      },
-      [&](std::uint64_t, std::span<const std::uint16_t> values) {
-        sha256.update(std::as_bytes(values));
-        if (found.empty()) found = index_problems(values, rule.extents[3], codebook, rule.name);
-      });
+  tiles.read_planes([&](std::uint64_t u,
+                        std::uint64_t count) { return indices.subspan(u * plane, count * plane); },
+                    [&](std::uint64_t, std::span<const std::uint16_t> values) {
+                      sha256.update(std::as_bytes(values));
+                      if (found.empty())
+                        found = index_problems(values, rule.extents[3], codebook, rule.name);
+                    });
   const std::string computed = sha256.hex_digest();
   if (computed != expected_sha256)
     throw FileError(path.string(), rule.name, "sha256 " + expected_sha256, computed);
@@ -85,10 +78,6 @@ std::shared_ptr<const CompressedAttenuationField> field_with_indices(
     const std::filesystem::path& path,
     const Communicator& communicator) {
   auto field = std::make_shared<CompressedAttenuationField>(header.field(path.string()));
-  std::optional<hdf5::IndexFilter> filter;
-  all_or_none(communicator, [&] {
-    if (communicator.is_root()) filter.emplace(field->codebook);
-  });
   for (std::size_t k = 0; k < header.index_rules.size(); ++k)
     field->slabs.push_back(all_or_none(communicator, [&] {
       return read_slab(
@@ -196,7 +185,7 @@ std::shared_ptr<const CompressedAttenuationField> read_atlas_member(
     std::size_t member,
     const std::string& payload_sha256,
     const Communicator& communicator) {
-  const ReadingTurn turn;  // HDF5 and its filter are for one thread
+  const ReadingTurn turn;  // HDF5 is for one thread
   const hdf5::QuietErrors quiet;
   const FileHeader header = shared_header(true, path, communicator);
   all_or_none(communicator, [&] {

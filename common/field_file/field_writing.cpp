@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <iterator>
-#include <optional>
 #include <span>
 #include <utility>
 
@@ -13,7 +12,6 @@
 #include "field_file/hdf5_calls.h"
 #include "field_file/index_chunks.h"
 #include "field_file/index_dataset.h"
-#include "field_file/index_filter.h"
 #include "files/input_guard.h"
 #include "files/output_file.h"
 #include "files/sha256.h"
@@ -31,18 +29,10 @@ using field_layout::index_rules;
 using field_layout::kSha256Digits;
 using field_layout::payload_hash;
 using hdf5::checked;
-using hdf5::create_index_dataset;
+using hdf5::DatasetBlock;
 using hdf5::Handle;
 using hdf5::hash_sum;
 using hdf5::naming_file;
-using hdf5::read_planes;
-
-/// First value and number of values of a block along the axes of its dataset: tiles, but along s
-/// rows.
-struct DatasetBlock {
-  std::array<std::uint64_t, 4> first{};
-  std::array<std::uint64_t, 4> count{};
-};
 
 DatasetBlock in_dataset(const IndexBlock& block, const DatasetRule& rule) {
   DatasetBlock values;
@@ -87,8 +77,6 @@ void check_blocks(const std::vector<IndexBlock>& blocks, const std::vector<Datas
 /// What a file is to hold except the provenance: a field or an atlas.
 struct FileContents {
   const char* format = field_layout::kFormat;
-  IndexPacking packing = IndexPacking::CodebookTree;
-  field_layout::CodebookParts codebook;
   std::string ct_sha256;
   std::vector<Dataset> payload;
   std::vector<Dataset> beside;  ///< not of the payload: ranges that two numbers do not state, bone
@@ -96,10 +84,8 @@ struct FileContents {
   std::uint64_t payload_bytes = 0;
 };
 
-FileContents contents_of(const CompressedAttenuationField& field, IndexPacking packing) {
+FileContents contents_of(const CompressedAttenuationField& field) {
   FileContents contents = {field_layout::kFormat,
-                           packing,
-                           field_layout::parts_of(field.codebook),
                            field.identity.ct.content_sha256,
                            field_layout::datasets_of(field),
                            field_layout::range_datasets(field.identity.range),
@@ -110,10 +96,8 @@ FileContents contents_of(const CompressedAttenuationField& field, IndexPacking p
   return contents;
 }
 
-FileContents contents_of(const AttenuationAtlas& atlas, IndexPacking packing) {
+FileContents contents_of(const AttenuationAtlas& atlas) {
   FileContents contents = {field_layout::kAtlasFormat,
-                           packing,
-                           field_layout::parts_of(atlas.codebook),
                            atlas.identity.ct.content_sha256,
                            field_layout::datasets_of(atlas),
                            field_layout::range_datasets(atlas.identity.range),
@@ -138,16 +122,7 @@ FileContents contents_of(const AttenuationAtlas& atlas, IndexPacking packing) {
 void create_file_without_indices(const FileContents& contents, const std::filesystem::path& path) {
   Handle file = hdf5::create_file(path);
   hdf5::write_text_attribute(file, "format", contents.format);
-  hdf5::write_int_attribute(
-      file, "format_version", field_layout::format_version_of(contents.packing, contents.codebook));
-  if (contents.codebook.has_means || contents.codebook.has_filter) {
-    hdf5::write_text_attribute(
-        file,
-        field_layout::kTileCodingAttribute,
-        contents.codebook.has_means ? field_layout::kMeanRemoved : field_layout::kPlainTiles);
-    hdf5::write_text_attribute(
-        file, field_layout::kPackingAttribute, field_layout::to_string(contents.packing));
-  }
+  hdf5::write_int_attribute(file, "format_version", field_layout::kFormatVersion);
   hdf5::write_text_attribute(file, "ct_sha256", contents.ct_sha256);
   hdf5::write_text_attribute(file, "payload_sha256", std::string(kSha256Digits, '0'));
   for (const std::vector<Dataset>* datasets : {&contents.payload, &contents.beside})
@@ -155,38 +130,8 @@ void create_file_without_indices(const FileContents& contents, const std::filesy
       hdf5::write_dataset(file, dataset, sha256_hex(dataset.bytes));
   const std::vector<hdf5::ChunkShape> chunks = hdf5::index_chunks(contents.indices);
   for (std::size_t k = 0; k < contents.indices.size(); ++k)
-    create_index_dataset(file, contents.indices[k], chunks[k], contents.packing);
+    hdf5::create_tiles(file, contents.indices[k], chunks[k]);
   file.close("H5Fclose");
-}
-
-/// Collective. Writes one block, or none where `block` is null. One plain hyperslab with a memory
-/// space of the same shape: collective filtered writes of unions of hyperslabs from a 1-D memory
-/// space crash or hang in HDF5 1.10.8 now and then.
-void write_block(hid_t dataset, const DatasetRule& rule, IndexBlock* block) {
-  const Handle in_file(H5Dget_space(dataset), H5Sclose, "H5Dget_space");
-  const Handle transfer(H5Pcreate(H5P_DATASET_XFER), H5Pclose, "H5Pcreate");
-  checked(H5Pset_dxpl_mpio(transfer, H5FD_MPIO_COLLECTIVE), "H5Pset_dxpl_mpio");
-  std::array<hsize_t, 4> start{};
-  std::array<hsize_t, 4> count = {1, 1, 1, 1};
-  if (block != nullptr) {
-    const DatasetBlock values = in_dataset(*block, rule);
-    std::ranges::copy(values.first, start.begin());
-    std::ranges::copy(values.count, count.begin());
-  }
-  const Handle in_memory(H5Screate_simple(4, count.data(), nullptr), H5Sclose, "H5Screate_simple");
-  const std::uint16_t nothing = 0;
-  const std::uint16_t* indices = &nothing;
-  if (block != nullptr) {
-    indices = block->indices.data();
-    checked(
-        H5Sselect_hyperslab(in_file, H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr),
-        "H5Sselect_hyperslab");
-  } else {
-    checked(H5Sselect_none(in_file), "H5Sselect_none");
-    checked(H5Sselect_none(in_memory), "H5Sselect_none");
-  }
-  checked(H5Dwrite(dataset, H5T_NATIVE_UINT16, in_memory, in_file, transfer, indices), "H5Dwrite");
-  if (block != nullptr) block->indices = {};
 }
 
 /// Hints as MPI wants them.
@@ -258,10 +203,15 @@ class SharedFile {
       for (IndexBlock& block : blocks)
         if (block.slab == k) of_slab.push_back(&block);
       naming_file(path_, [&] {
-        const Handle dataset(
-            H5Dopen2(file_, rules_[k].name.c_str(), H5P_DEFAULT), H5Dclose, "H5Dopen2");
-        for (std::size_t i = 0; i < most_blocks[k]; ++i)
-          write_block(dataset, rules_[k], i < of_slab.size() ? of_slab[i] : nullptr);
+        const hdf5::StoredTiles tiles(file_, rules_[k], path_.string());
+        for (std::size_t i = 0; i < most_blocks[k]; ++i) {
+          if (i >= of_slab.size()) {
+            tiles.write(nullptr, {});
+            continue;
+          }
+          const DatasetBlock block = in_dataset(*of_slab[i], rules_[k]);
+          tiles.write(&block, std::exchange(of_slab[i]->indices, {}));
+        }
       });
     }
   }
@@ -331,14 +281,12 @@ std::string verified_sha256(hid_t file,
                             const DatasetRule& rule,
                             std::uint64_t written_sum,
                             const std::filesystem::path& path) {
-  const Handle dataset(H5Dopen2(file, rule.name.c_str(), H5P_DEFAULT), H5Dclose, "H5Dopen2");
+  const hdf5::StoredTiles tiles(file, rule, path.string());
   const std::uint64_t plane_values = rule.value_count() / rule.extents[0];
   std::vector<std::uint16_t> planes;
   Sha256 sha256;
   std::uint64_t sum = 0;
-  read_planes(
-      dataset,
-      rule,
+  tiles.read_planes(
       [&](std::uint64_t, std::uint64_t count) {
         planes.resize(count * plane_values);
         return std::span(planes);
@@ -351,11 +299,6 @@ std::string verified_sha256(hid_t file,
     throw FileError(
         path.string(), rule.name, "the indices written", "different indices on reading back");
   return sha256.hex_digest();
-}
-
-/// How many ranks of this one's node verify at the same time.
-int verifying_ranks(const std::vector<DatasetRule>& rules, const Communicator& communicator) {
-  return std::min(communicator.node().size(), static_cast<int>(rules.size()));
 }
 
 /// Collective. The hash of every slab's indices, read back; ranks take the slabs in turn.
@@ -394,10 +337,8 @@ std::string seal(const FileContents& contents,
                  const std::filesystem::path& path) {
   Handle file = hdf5::open_file(path, H5F_ACC_RDWR);
   const std::vector<DatasetRule>& rules = contents.indices;
-  for (std::size_t k = 0; k < rules.size(); ++k) {
-    const Handle dataset(H5Dopen2(file, rules[k].name.c_str(), H5P_DEFAULT), H5Dclose, "H5Dopen2");
-    hdf5::replace_text_attribute(dataset, "sha256", index_sha256[k]);
-  }
+  for (std::size_t k = 0; k < rules.size(); ++k)
+    hdf5::state_sha256(file, rules[k].name, index_sha256[k]);
   std::string payload = payload_hash(contents.payload, rules, index_sha256);
   hdf5::replace_text_attribute(file, "payload_sha256", payload);
   hdf5::write_text_attribute(file, "options_toml", provenance.options_toml);
@@ -417,22 +358,15 @@ void share(FieldFileInfo& info, const Communicator& communicator) {
 
 /// Collective. What write_field() and write_atlas() promise.
 FieldFileInfo write_file(const FileContents& contents,
-                         const Codebook& codebook,
                          const NextBlocks& next_blocks,
                          const MakeProvenance& make_provenance,
                          const std::filesystem::path& path,
                          const Communicator& communicator,
                          const MpiIoHints& hints) {
   const hdf5::QuietErrors quiet;
-  // HDF5 calls it, wherever chunks are written and read back below.
-  std::optional<hdf5::IndexFilter> filter;
-  const int ranks_at_once = verifying_ranks(contents.indices, communicator);
-  all_or_none(communicator,
-              [&] { filter.emplace(codebook, std::max(1, usable_processors() / ranks_at_once)); });
   const std::filesystem::path partial = field_layout::unfinished_path(path);
   FieldFileInfo info;
   info.payload_bytes = contents.payload_bytes;
-  info.packing = contents.packing;
   // Not in the block below, which removes the partial file on failure: this check may refuse a file
   // that this program did not make.
   all_or_none(communicator, [&] {
@@ -482,15 +416,8 @@ FieldFileInfo write_field(const CompressedAttenuationField& field,
                           const MakeProvenance& make_provenance,
                           const std::filesystem::path& path,
                           const Communicator& communicator,
-                          const MpiIoHints& hints,
-                          IndexPacking packing) {
-  return write_file(contents_of(field, packing),
-                    field.codebook,
-                    next_blocks,
-                    make_provenance,
-                    path,
-                    communicator,
-                    hints);
+                          const MpiIoHints& hints) {
+  return write_file(contents_of(field), next_blocks, make_provenance, path, communicator, hints);
 }
 
 FieldFileInfo write_atlas(const AttenuationAtlas& atlas,
@@ -498,15 +425,8 @@ FieldFileInfo write_atlas(const AttenuationAtlas& atlas,
                           const MakeProvenance& make_provenance,
                           const std::filesystem::path& path,
                           const Communicator& communicator,
-                          const MpiIoHints& hints,
-                          IndexPacking packing) {
-  return write_file(contents_of(atlas, packing),
-                    atlas.codebook,
-                    next_blocks,
-                    make_provenance,
-                    path,
-                    communicator,
-                    hints);
+                          const MpiIoHints& hints) {
+  return write_file(contents_of(atlas), next_blocks, make_provenance, path, communicator, hints);
 }
 
 FieldFileInfo write_field(const CompressedAttenuationField& field,
@@ -514,8 +434,7 @@ FieldFileInfo write_field(const CompressedAttenuationField& field,
                           const FieldProvenance& provenance,
                           const std::filesystem::path& path,
                           const Communicator& communicator,
-                          const MpiIoHints& hints,
-                          IndexPacking packing) {
+                          const MpiIoHints& hints) {
   std::vector<IndexBlock> left = my_blocks;
   return write_field(
       field,
@@ -523,8 +442,7 @@ FieldFileInfo write_field(const CompressedAttenuationField& field,
       [&] { return provenance; },
       path,
       communicator,
-      hints,
-      packing);
+      hints);
 }
 
 }  // namespace af

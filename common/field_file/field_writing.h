@@ -26,12 +26,15 @@ struct IndexBlock {
   std::vector<std::uint16_t> indices;
 };
 
-/// Tiles along s and along t that one chunk of an index dataset spans, where the slab has as many;
-/// along u it spans kIndexChunkTilesAlongU where that does not make planes too large. Blocks that
-/// begin and end at multiples of them are written without reading chunks back. Chunks of fields of
-/// more than 16 GiB are larger.
-inline constexpr std::array<int, 2> kIndexChunkTiles = {128, 64};
+/// Tiles along s and along t that one chunk of a file spans, where the slab has as many; along u it
+/// spans kIndexChunkTilesAlongU where that does not make planes too large. A DRR looks at a few
+/// viewpoints and at a part of their (s,t) plane. Blocks that begin and end at multiples of them
+/// are written without reading chunks back. Chunks of fields of more than 32 GiB are larger.
+inline constexpr std::array<int, 2> kIndexChunkTiles = {32, 64};
 inline constexpr int kIndexChunkTilesAlongU = 8;
+/// Where tiles have means, a block begins along t at a multiple of so many tiles: between these,
+/// the file holds means as differences.
+inline constexpr int kMeanRunTiles = 16;
 
 /// Returns this rank's next blocks, or none when it has no more. Every rank calls it equally often,
 /// until no rank has any left; an exception is thrown on every rank.
@@ -54,16 +57,14 @@ FieldFileInfo write_field(const CompressedAttenuationField& field,
                           const MakeProvenance& make_provenance,
                           const std::filesystem::path& path,
                           const Communicator& communicator,
-                          const MpiIoHints& hints = {},
-                          IndexPacking packing = IndexPacking::CodebookTree);
+                          const MpiIoHints& hints = {});
 /// Collective. The same in one round.
 FieldFileInfo write_field(const CompressedAttenuationField& field,
                           const std::vector<IndexBlock>& my_blocks,
                           const FieldProvenance& provenance,
                           const std::filesystem::path& path,
                           const Communicator& communicator,
-                          const MpiIoHints& hints = {},
-                          IndexPacking packing = IndexPacking::CodebookTree);
+                          const MpiIoHints& hints = {});
 
 /// Collective. write_field() for an atlas: a block's slab counts over the slabs of all members. The
 /// identity of every member must name the atlas's CT and attenuation.
@@ -72,8 +73,7 @@ FieldFileInfo write_atlas(const AttenuationAtlas& atlas,
                           const MakeProvenance& make_provenance,
                           const std::filesystem::path& path,
                           const Communicator& communicator,
-                          const MpiIoHints& hints = {},
-                          IndexPacking packing = IndexPacking::CodebookTree);
+                          const MpiIoHints& hints = {});
 
 /// Rank 0 alone, before the work: announce_output() of a field and of what write_field() and
 /// check_parallel_writing() put beside it.

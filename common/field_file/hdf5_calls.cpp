@@ -7,7 +7,6 @@
 #include "base/error.h"
 #include "base/joined.h"
 #include "field_file/index_chunks.h"
-#include "field_file/index_filter.h"
 #include "files/sha256.h"
 
 namespace af::hdf5 {
@@ -88,8 +87,7 @@ void check_is_of_this_file(hid_t file, const DatasetRule& rule, const std::strin
 }
 
 /// Contents of this file itself, in pieces that fit in memory, by filters that HDF5 has built in:
-/// not those of another file (external, virtual), and nothing that loads a plug-in; or by the
-/// filter of indices.
+/// not those of another file (external, virtual), and nothing that loads a plug-in.
 void check_storage(hid_t dataset, const DatasetRule& rule, const std::string& path) {
   const Handle creation(H5Dget_create_plist(dataset), H5Pclose, "H5Dget_create_plist");
   const H5D_layout_t layout = H5Pget_layout(creation);
@@ -101,11 +99,6 @@ void check_storage(hid_t dataset, const DatasetRule& rule, const std::string& pa
     std::size_t parameters = 0;
     const H5Z_filter_t filter = H5Pget_filter2(
         creation, static_cast<unsigned>(i), &flags, &parameters, nullptr, 0, nullptr, nullptr);
-    if (filter == kIndexFilter) {
-      if (const std::string problem = index_filter_problem(creation); !problem.empty())
-        throw FileError(path, rule.name, "indices coded as here", problem);
-      continue;
-    }
     if (filter != H5Z_FILTER_DEFLATE && filter != H5Z_FILTER_SHUFFLE &&
         filter != H5Z_FILTER_FLETCHER32)
       throw FileError(
@@ -136,6 +129,7 @@ Handle small_dataset_creation(const Dataset& dataset) {
   checked(H5Pset_chunk(creation, static_cast<int>(chunk.size()), chunk.data()), "H5Pset_chunk");
   checked(H5Pset_shuffle(creation), "H5Pset_shuffle");
   checked(H5Pset_deflate(creation, kLevel), "H5Pset_deflate");
+  checked(H5Pset_fletcher32(creation), "H5Pset_fletcher32");
   return creation;
 }
 
@@ -254,7 +248,7 @@ void write_dataset(hid_t file, const Dataset& dataset, const std::string& sha256
 Handle open_dataset(hid_t file,
                     const DatasetRule& rule,
                     const std::string& path,
-                    std::vector<std::uint64_t>& found) {
+                    std::vector<std::uint64_t>* found) {
   check_is_of_this_file(file, rule, path);
   Handle dataset(H5Dopen2(file, rule.name.c_str(), H5P_DEFAULT), H5Dclose, "H5Dopen2");
   check_storage(dataset, rule, path);
@@ -262,20 +256,21 @@ Handle open_dataset(hid_t file,
   if (!is_type_of(type, rule))
     throw FileError(
         path, rule.name, std::string("elements ") + to_string(rule.type), "another type");
-  found = extents_of(dataset, rule, type);
-  if (!fits(found, rule))
+  const std::vector<std::uint64_t> extents = extents_of(dataset, rule, type);
+  if (!fits(extents, rule))
     throw FileError(path,
                     rule.name,
                     std::string("extents ") + (rule.is_first_extent_free ? "up to " : "") +
                         text_of(rule.extents),
-                    text_of(found));
+                    text_of(extents));
+  if (found != nullptr) *found = extents;
   return dataset;
 }
 
 Dataset read_dataset(hid_t file, const DatasetRule& rule, const std::string& path) {
   Dataset dataset{rule, {}};
   std::vector<std::uint64_t> extents;
-  const Handle object = open_dataset(file, rule, path, extents);
+  const Handle object = open_dataset(file, rule, path, &extents);
   dataset.rule.extents = extents;
   std::uint64_t elements = 1;
   for (const std::uint64_t extent : extents) elements *= extent;  // bounded by the rule

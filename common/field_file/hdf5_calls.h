@@ -59,7 +59,7 @@ void write_dataset(hid_t file, const field_layout::Dataset& dataset, const std::
 Handle open_dataset(hid_t file,
                     const field_layout::DatasetRule& rule,
                     const std::string& path,
-                    std::vector<std::uint64_t>& found);
+                    std::vector<std::uint64_t>* found = nullptr);
 
 /// Reads a small dataset and verifies its sha256. Throws FileError.
 field_layout::Dataset read_dataset(hid_t file,

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "field_file/field_layout.h"
 #include "field_file/field_writing.h"
 #include "field_file/hdf5_calls.h"
 
@@ -15,31 +16,31 @@ namespace {
 constexpr int kMostDoublings = 16;
 
 /// Tiles along u that a chunk spans: whoever reads a field holds so many planes of equal u.
-hsize_t tiles_along_u(const DatasetRule& rule) {
+hsize_t tiles_along_u(const std::vector<std::uint64_t>& extents) {
   constexpr std::uint64_t kMostTilesAtOnce = std::uint64_t{16} << 20;
-  const std::uint64_t plane =
-      rule.extents[1] * rule.extents[2] * rule.extents[3] / rule.rows_per_tile;
+  const std::uint64_t plane = extents[1] * extents[2] * extents[3];
   hsize_t tiles = kIndexChunkTilesAlongU;
   while (tiles > 1 && tiles * plane > kMostTilesAtOnce) tiles /= 2;
-  return std::min<hsize_t>(tiles, rule.extents[0]);
+  return std::min<hsize_t>(tiles, extents[0]);
 }
 
 /// The shape after some doublings, or after fewer where it can grow no more.
 ChunkShape chunk_shape(const DatasetRule& rule, int doublings) {
-  ChunkShape shape = {tiles_along_u(rule),
+  const std::vector<std::uint64_t> extents = field_layout::codewords_rule(rule).extents;
+  ChunkShape shape = {tiles_along_u(extents),
                       1,
-                      std::min<hsize_t>(rule.rows_per_tile * kIndexChunkTiles[0], rule.extents[2]),
-                      std::min<hsize_t>(kIndexChunkTiles[1], rule.extents[3])};
+                      std::min<hsize_t>(kIndexChunkTiles[0], extents[2]),
+                      std::min<hsize_t>(kIndexChunkTiles[1], extents[3])};
   std::uint64_t elements = shape[0] * shape[2] * shape[3];
   for (const std::size_t axis : {1u, 2u, 3u, 0u})
-    for (; doublings > 0 && shape[axis] < rule.extents[axis] && 2 * elements <= kMaxChunkElements;
+    for (; doublings > 0 && shape[axis] < extents[axis] && 2 * elements <= kMaxChunkElements;
          --doublings) {
       shape[axis] *= 2;
       elements *= 2;
     }
   // HDF5 takes no chunk that is larger than a dataset of fixed size.
   for (std::size_t axis = 0; axis < shape.size(); ++axis)
-    shape[axis] = std::min<hsize_t>(shape[axis], rule.extents[axis]);
+    shape[axis] = std::min<hsize_t>(shape[axis], extents[axis]);
   return shape;
 }
 
@@ -54,9 +55,10 @@ std::uint64_t count_of(const std::vector<DatasetRule>& rules,
                        const std::vector<ChunkShape>& shapes) {
   std::uint64_t count = 0;
   for (std::size_t k = 0; k < rules.size(); ++k) {
-    std::uint64_t of_slab = 1;
+    const std::vector<std::uint64_t> extents = field_layout::codewords_rule(rules[k]).extents;
+    std::uint64_t of_slab = rules[k].rows_per_tile;  // datasets
     for (std::size_t axis = 0; axis < 4; ++axis)
-      of_slab *= (rules[k].extents[axis] + shapes[k][axis] - 1) / shapes[k][axis];
+      of_slab *= (extents[axis] + shapes[k][axis] - 1) / shapes[k][axis];
     count += of_slab;
   }
   return count;

@@ -14,16 +14,16 @@ namespace af::hdf5 {
 
 /// Most elements of a chunk, which HDF5 holds whole, that is read or written.
 inline constexpr std::uint64_t kMaxChunkElements = 1u << 20;
-/// Chunks of all slabs together beyond which chunks grow: 16 GiB of indices in chunks of 16 KiB.
-/// While a field is written every rank holds about 100 bytes per chunk.
+/// Chunks of all slabs together beyond which chunks grow: 32 GiB in chunks of 32 KiB. While a field
+/// is written every rank holds about 100 bytes per chunk.
 inline constexpr std::uint64_t kMostSmallChunks = 1u << 20;
 
 using ChunkShape = std::array<hsize_t, 4>;
 
-/// The chunks of every slab's index dataset: kIndexChunkTiles (with means, if any), and along u
-/// kIndexChunkTilesAlongU, or fewer where so many planes of equal u are large. Fields of more than
-/// kMostSmallChunks chunks take larger ones: doubled first along v, so that such planes still are
-/// whole chunks, and only then along s, t and u.
+/// The chunks of every slab's codewords: kIndexChunkTiles, and along u kIndexChunkTilesAlongU, or
+/// fewer where so many planes of equal u are large; those of the means, if any, are the same tiles.
+/// Fields of more than kMostSmallChunks chunks take larger ones: doubled first along v, so that
+/// such planes still are whole chunks, and only then along s, t and u.
 std::vector<ChunkShape> index_chunks(const std::vector<field_layout::DatasetRule>& rules);
 
 /// Chunks of all index datasets together.

@@ -21,8 +21,7 @@ std::string ct_keys_text(const CtReadOptions& reading);
 /// two do not go together.
 CtReadOptions ct_reading_in_force(const CtReadOptions& typed, const CtReadOptions& of_study);
 
-/// How a CT was read, by the options that a field records. Texts of older programs give the
-/// default.
+/// How a CT was read, by the options that a field records.
 CtReadOptions ct_reading_of(const std::string& options_toml);
 
 }  // namespace af

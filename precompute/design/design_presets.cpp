@@ -17,9 +17,9 @@ const std::array presets = {
                  {1, 64, 256, 16384, "linear"},
                  {}},
     DesignPreset{"compact",
-                 "what a probe of the CT finds best within 2 MB",
+                 "what a probe of the CT finds best within 4 MB",
                  {12, 8, 256, 16384, "cubic"},
-                 {std::nullopt, 2 * kMegabyte, std::nullopt}},
+                 {std::nullopt, 4 * kMegabyte, std::nullopt}},
     // For registration, depth slabs matter more than PSNR: with the one slab that a probe chose at
     // the same PSNR, registrations ended twice as far from ray casting's pose.
     DesignPreset{
@@ -37,10 +37,10 @@ const std::array presets = {
         {8, 12, 384, 16384, "cubic", 64},
         {}},
     DesignPreset{"fine",
-                 "what a probe of the CT finds best within 8 MB: the truest poses, in several "
+                 "what a probe of the CT finds best within 15 MB: the truest poses, in several "
                  "times the time",
                  {12, 10, 512, 65536, "cubic"},
-                 {std::nullopt, 8 * kMegabyte, std::nullopt}},
+                 {std::nullopt, 15 * kMegabyte, std::nullopt}},
 };
 
 }  // namespace

@@ -226,18 +226,17 @@ DesignMeasurement DesignProbe::measure(const FieldDesign& design,
     const Codebook codebook = drawn_codebook(tiles, {count, design.mean_step, options_.seed});
     std::array<std::uint64_t, 2> sums{};
     // A trained codebook's indices are coded in fewer bytes than a drawn one's.
-    constexpr double kTrainedCodebook = 0.83;
+    constexpr double kTrainedCodebook = 0.92;
     // A few chunks suffice for the estimate.
     constexpr std::size_t kChunks = 8;
     const NearestCodeword search(codebook);
-    const IndexCoding coding(codebook);
     const std::size_t stride = 1 + sample.occupied_share.size() / kChunks;
     std::size_t at = 0;
     for (std::size_t number = 0; number < sample.occupied_share.size(); ++number) {
       if (!share_.has(number)) continue;
       const FieldSample::Chunk& chunk = sample.chunks[at++];
       if (number % stride != 0) continue;
-      const IndexBytes bytes = index_bytes(chunk, search, coding);
+      const IndexBytes bytes = index_bytes(chunk, search, design.mean_step > 0);
       sums[0] += static_cast<std::uint64_t>(bytes.bytes);
       sums[1] += static_cast<std::uint64_t>(bytes.tiles);
     }
@@ -245,7 +244,7 @@ DesignMeasurement DesignProbe::measure(const FieldDesign& design,
     // Extrapolates from a smaller codebook to the one wanted.
     const double missing_bits = std::log2(1.0 * count / static_cast<double>(codebook.size()));
     measured.bytes_per_tile[count] =
-        kTrainedCodebook * sharing_along_u(lattice.slabs[0].u.stored.tiles()) *
+        kTrainedCodebook *
         (static_cast<double>(sums[0]) / std::max(1.0, static_cast<double>(sums[1])) +
          missing_bits / 8.0);
   }

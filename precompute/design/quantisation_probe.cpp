@@ -9,6 +9,7 @@
 #include "precompute/codebook/codebook_training.h"
 #include "precompute/codebook/tile_drawing.h"
 #include "precompute/codebook/unit_encoding.h"
+#include "precompute/design/packed_bytes.h"
 
 namespace af {
 
@@ -87,20 +88,11 @@ double error_ratio(const std::array<double, kProbeCodewords.size()>& errors_of_s
 
 IndexBytes index_bytes(const FieldSample::Chunk& chunk,
                        const NearestCodeword& search,
-                       const IndexCoding& coding) {
+                       bool has_means) {
   const EncodedUnit encoded = encode_unit(search, chunk.unit, chunk.tiles);
-  std::array<std::size_t, 4> tiles{};
-  std::ranges::transform(chunk.unit.tile_counts(), tiles.begin(), [](int count) {
-    return static_cast<std::size_t>(count);
-  });
-  return {static_cast<double>(coding.encode(encoded.indices, tiles).size()),
+  const auto row_tiles = static_cast<std::size_t>(chunk.unit.tile_counts()[3]);
+  return {static_cast<double>(packed_bytes(encoded.indices, row_tiles, has_means)),
           static_cast<double>(chunk.tiles.tiles.size())};
-}
-
-double sharing_along_u(int viewpoint_tiles) {
-  // Chunk by chunk of one and of eight viewpoint tiles (docs/coding.md): 0.96 with 4 tiles along u,
-  // 0.83 to 0.91 with 8, 0.75 with 32.
-  return std::clamp(1.1 - 0.075 * std::log2(1.0 * viewpoint_tiles), 0.7, 1.0);
 }
 
 }  // namespace af

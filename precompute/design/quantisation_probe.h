@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "field/codebook.h"
-#include "field/index_coding.h"
 #include "precompute/codebook/nearest_codeword.h"
 #include "precompute/codebook/tile_selection.h"
 #include "precompute/design/field_sample.h"
@@ -62,21 +61,16 @@ double error_ratio(const std::array<double, kProbeCodewords.size()>& errors_of_s
                    int codewords,
                    const TrainingTiles& tiles);
 
-/// Bytes of the indices (and means) of chunks, coded as in a field's file, and their tiles that are
-/// not empty.
+/// Bytes of the indices (and means) of a chunk in a field's file, and its tiles that are not empty.
 struct IndexBytes {
   double bytes = 0.0;
   double tiles = 0.0;
 };
 IndexBytes index_bytes(const FieldSample::Chunk& chunk,
                        const NearestCodeword& search,
-                       const IndexCoding& coding);
+                       bool has_means);
 
 /// Bytes of a codebook in a file, deflated, per codeword.
 inline constexpr double kFileBytesPerCodeword = 17.0;
-
-/// Bytes of chunks that span several viewpoint tiles along u, which resemble each other, relative
-/// to chunks of one tile.
-double sharing_along_u(int viewpoint_tiles);
 
 }  // namespace af

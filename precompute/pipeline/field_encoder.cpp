@@ -19,8 +19,9 @@ namespace af {
 
 namespace {
 
-static_assert(kLargestS == 2 * kIndexChunkTiles[0] && kLargestT == 2 * kIndexChunkTiles[1],
+static_assert(kLargestS % (2 * kIndexChunkTiles[0]) == 0 && kLargestT == 2 * kIndexChunkTiles[1],
               "a unit that is not cut is whole chunks of a field file");
+static_assert(kRunOfT == 2 * kMeanRunTiles, "units begin where differences of means do");
 
 using Clock = std::chrono::steady_clock;
 
@@ -49,7 +50,7 @@ std::vector<std::size_t> balanced_owners(const std::vector<std::uint64_t>& unit_
   return owners;
 }
 
-/// Over the codewords as they are searched, as progress of earlier versions has it.
+/// Over the codewords as they are searched.
 std::uint32_t crc_of(const Codebook& codebook) {
   const std::vector<Tile> codewords = searched_codewords(codebook);
   const std::uint32_t crc = crc32c(std::as_bytes(std::span(codewords)));

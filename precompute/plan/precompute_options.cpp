@@ -274,14 +274,6 @@ void describe_run(Fields& field, PrecomputeOptions& options) {
         "FIELD.h5.progress), cast-again, or auto (whichever is measured to be faster)")
       .one_of({"auto", "read-back", "cast-again"})
       .not_deciding(why);
-  field("index_packing",
-        options.index_packing,
-        "How the file holds the indices: codebook-tree (about half the bytes, up to a second more "
-        "to write and read), or deflate (any reader of HDF5 can); the payload is the same "
-        "[deflate for the preset 'paper' and for designs of plain tiles that are typed; else "
-        "codebook-tree]")
-      .one_of({"codebook-tree", "deflate"})
-      .not_deciding(why);
   field("mpi_io_hints",
         options.mpi_io_hints,
         "KEY=VALUE, once per hint to MPI-IO: cb_nodes, cb_buffer_size, striping_factor, ...; "
@@ -318,7 +310,6 @@ PrecomputeOptions PrecomputeOptions::in_force() const {
   if (needs_probe()) return *this;
   PrecomputeOptions options = with_design(design());
   options.st_plane = st_plane_rule() == StPlane::Centre ? "centre" : "centroid";
-  options.index_packing = packs_by_codebook_tree() ? "codebook-tree" : "deflate";
   return options;
 }
 
@@ -346,14 +337,6 @@ bool PrecomputeOptions::needs_probe() const {
 
 const DesignBudget& PrecomputeOptions::limits() const {
   return budget.is_stated() ? budget : design_preset().budget;
-}
-
-bool PrecomputeOptions::packs_by_codebook_tree() const {
-  if (index_packing) return *index_packing == "codebook-tree";
-  // Means cost more than they gain when they are deflated.
-  if (design().mean_step > 0) return true;
-  // A design that is typed is for comparisons with the paper, whose files are deflated.
-  return limits().is_stated() || design_preset().name != std::string_view(kPaperPreset);
 }
 
 double min_improvement_of(const FieldDesign& design) {
@@ -443,10 +426,6 @@ std::vector<std::string> problems(const PrecomputeOptions& options) {
                     std::to_string(kFewestFittedViewpoints) + " with uv_samples = least-squares");
   if (options.mean_step && options.tile_coding == "plain")
     found.emplace_back("mean_step: plain tiles have no means; leave it out");
-  if (options.limits().max_field_bytes && !options.packs_by_codebook_tree())
-    found.emplace_back(
-        "index_packing = deflate: the size limit of --max-field-size or the preset assumes "
-        "codebook-tree; leave out --index-packing or the limit");
   if (!options.center_ct_mm.empty() && options.center_ct_mm.size() != 3)
     found.push_back("center_ct_mm has " + std::to_string(options.center_ct_mm.size()) +
                     " numbers: must be x,y,z");

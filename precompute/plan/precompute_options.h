@@ -79,8 +79,7 @@ struct PrecomputeOptions {
   std::uint64_t memory_limit_bytes = 0;  ///< per rank beside the CT; 0: kDefaultMemoryLimitBytes
   std::string overflow = "auto";         ///< of tiles beyond it: "auto", "read-back", "cast-again"
   std::string output;
-  std::optional<std::string> index_packing;  ///< "codebook-tree" or "deflate"
-  std::vector<std::string> mpi_io_hints;     ///< KEY=VALUE
+  std::vector<std::string> mpi_io_hints;  ///< KEY=VALUE
   bool is_dry_run = false;
   bool is_restart = false;
   bool has_checkpoint = true;
@@ -97,8 +96,6 @@ struct PrecomputeOptions {
   [[nodiscard]] bool needs_probe() const;
   /// The design's budget: the stated one, or the preset's.
   [[nodiscard]] const DesignBudget& limits() const;
-  /// Whether the codebook tree packs the indices; otherwise they are deflated.
-  [[nodiscard]] bool packs_by_codebook_tree() const;
   /// The design: of the preset, with the parts that are stated.
   [[nodiscard]] FieldDesign design() const { return stated_parts().over(design_preset().design); }
   /// These options with `nodes` in place of the spacing on the (s,t) planes.

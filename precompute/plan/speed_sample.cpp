@@ -10,14 +10,12 @@
 #include <unistd.h>
 #include <utility>
 #include <vector>
-#include <zlib.h>
 
 #include "base/error.h"
 #include "base/hash_random.h"
-#include "field/index_coding.h"
 #include "precompute/codebook/mean_removal.h"
 #include "precompute/codebook/nearest_codeword.h"
-#include "precompute/design/quantisation_probe.h"
+#include "precompute/design/packed_bytes.h"
 #include "precompute/units/unit_tiles.h"
 
 namespace af {
@@ -78,46 +76,7 @@ Codebook drawn_codebook(std::vector<Tile> tiles, int codewords, int mean_step) {
   return codebook_of_searched(std::move(drawn), mean_step);
 }
 
-struct PackedSample {
-  double bytes = 0.0;
-  double seconds = 0.0;
-};
-
-/// As HDF5's shuffle and deflate filters do it.
-PackedSample deflated(const std::vector<std::uint16_t>& indices) {
-  std::vector<Bytef> low_then_high(2 * indices.size());
-  for (std::size_t i = 0; i < indices.size(); ++i) {
-    low_then_high[i] = static_cast<Bytef>(indices[i] & 0xFFu);
-    low_then_high[indices.size() + i] = static_cast<Bytef>(indices[i] >> 8u);
-  }
-  uLongf bytes = compressBound(low_then_high.size());
-  std::vector<Bytef> packed(bytes);
-  constexpr int kDeflateLevel = 4;
-  const Stopwatch watch;
-  const int status =
-      compress2(packed.data(), &bytes, low_then_high.data(), low_then_high.size(), kDeflateLevel);
-  check(status == Z_OK, "zlib compresses what fits");
-  return {static_cast<double>(bytes), watch.seconds()};
-}
-
-/// As a field's file has them, but a row of tiles alone: there are no neighbours along u and s.
-/// What those save was measured on fields of four slabs and of the paper's design.
-PackedSample coded_by_tree(const std::vector<std::uint16_t>& indices,
-                           std::size_t tiles,
-                           const Codebook& codebook,
-                           int viewpoint_tiles) {
-  constexpr double kShareOfNeighbours = 0.78;
-  const IndexCoding coding(codebook);
-  const Stopwatch watch;
-  const std::vector<std::uint8_t> coded = coding.encode(indices, {1, 1, 1, tiles});
-  return {kShareOfNeighbours * sharing_along_u(viewpoint_tiles) * static_cast<double>(coded.size()),
-          watch.seconds()};
-}
-
-void sample_search(SampledTiles tiles,
-                   const PrecomputeOptions& options,
-                   int viewpoint_tiles,
-                   SpeedSample& sample) {
+void sample_search(SampledTiles tiles, const PrecomputeOptions& options, SpeedSample& sample) {
   if (tiles.run.empty() || tiles.spread.empty()) return;
   const int mean_step = options.design().mean_step;
   std::vector<std::uint16_t> means;
@@ -144,13 +103,12 @@ void sample_search(SampledTiles tiles,
   sample.train_seconds_per_tile = seconds_per_tile(SearchHint::PerTile);
   std::vector<std::uint16_t> indices(nearest.begin(), nearest.end());
   indices.insert(indices.end(), means.begin(), means.end());
-  const PackedSample packed =
-      options.packs_by_codebook_tree()
-          ? coded_by_tree(indices, nearest.size(), codebook, viewpoint_tiles)
-          : deflated(indices);
+  const Stopwatch packing;
+  const auto packed =
+      static_cast<double>(packed_bytes(indices, nearest.size(), /*has_means=*/mean_step > 0));
   const auto bytes = 2.0 * static_cast<double>(indices.size());
-  sample.compress_seconds_per_byte = packed.seconds / bytes;
-  sample.compressed_fraction = packed.bytes / bytes;
+  sample.compress_seconds_per_byte = packing.seconds() / bytes;
+  sample.compressed_fraction = packed / bytes;
 }
 
 }  // namespace
@@ -183,7 +141,7 @@ SpeedSample sample_speed(const FieldCaster& caster,
   SpeedSample sample;
   sample.rays_per_second = static_cast<double>(rays) / std::max(elapsed, 1e-9);
   sample.occupied_fraction = static_cast<double>(occupied) / static_cast<double>(tiles);
-  sample_search(sampled, options, lattice.slabs.front().u.stored.tiles(), sample);
+  sample_search(sampled, options, sample);
   return sample;
 }
 

@@ -24,7 +24,7 @@ fail() {
 hash_of() { sed -n 's/.*sha256 //p' "$1"; }
 
 common=(--ct ct.mha --rig c-arm-12in --camera AP --max-rotation-deg 10 --max-translation-mm 10 --slabs 2 --uv-nodes 7)
-common+=(--st-nodes 61 --codewords 200 --index-packing codebook-tree)
+common+=(--st-nodes 61 --codewords 200)
 orbit=("${common[@]}" --orbit 'axis=z,from=-40,to=20')
 
 # refuse CODE PATTERN OPTION...: with the common options.

@@ -12,7 +12,7 @@
 #include "field_file/field_reading.h"
 #include "field_file/field_writing.h"
 #include "field_file/hdf5_calls.h"
-#include "field_file/index_filter.h"
+#include "field_file/index_dataset.h"
 #include "files/sha256.h"
 #include "fuzz/fuzz_input.h"
 #include "fuzz/sample_field.h"
@@ -59,6 +59,10 @@ SoundFile written_file(SoundFile sound, const std::vector<Dataset>& beside) {
   };
   add(sound.payload);
   add(sound.indices);
+  for (const DatasetRule& rule : sound.indices) {
+    add({field_layout::codewords_rule(rule)});
+    if (rule.rows_per_tile > 1) add({field_layout::means_rule(rule)});
+  }
   add(field_layout::provenance_rules());
   for (const Dataset& dataset : beside) sound.names.push_back(dataset.rule.name);
   return sound;
@@ -66,15 +70,13 @@ SoundFile written_file(SoundFile sound, const std::vector<Dataset>& beside) {
 
 constexpr const char* kOptions = "seed = 1\n";
 
-SoundFile sound_field(const CompressedAttenuationField& field, IndexPacking packing) {
+SoundFile sound_field(const CompressedAttenuationField& field) {
   const bool has_means = field.codebook.has_means();
   write_field(field,
               fuzz::sample_blocks(field.lattice(), has_means),
               {"0.1.0", "af-precompute", kOptions, "{}"},
               fuzz::scratch_folder() / kElsewhere,
-              Communicator::world(),
-              {},
-              packing);
+              Communicator::world());
   std::vector<Dataset> beside = field_layout::range_datasets(field.identity.range);
   for (Dataset& dataset : field_layout::material_datasets(field.identity.material))
     beside.push_back(std::move(dataset));
@@ -110,7 +112,7 @@ SoundFile sound_atlas(const AttenuationAtlas& atlas) {
   return written_file(sound, {});
 }
 
-/// Every version of the format and everything that a file may or may not have, each once.
+/// Everything that a file may or may not have, each once.
 std::vector<SoundFile> sound_files() {
   start_mpi();
   const CompressedAttenuationField plain = fuzz::sample_field();
@@ -123,14 +125,12 @@ std::vector<SoundFile> sound_files() {
   one_sided.identity.range.high.rotation_rad.y() *= 2.0;
   CompressedAttenuationField bone = plain;
   bone.identity.material = FieldMaterial::Bone;
-  return {sound_field(plain, IndexPacking::CodebookTree),
-          sound_field(mean_removed, IndexPacking::CodebookTree),
-          sound_field(plain, IndexPacking::Deflate),
-          sound_field(mean_removed, IndexPacking::Deflate),
-          sound_field(filtered, IndexPacking::CodebookTree),
-          sound_field(filtered_plain, IndexPacking::Deflate),
-          sound_field(one_sided, IndexPacking::CodebookTree),
-          sound_field(bone, IndexPacking::CodebookTree),
+  return {sound_field(plain),
+          sound_field(mean_removed),
+          sound_field(filtered),
+          sound_field(filtered_plain),
+          sound_field(one_sided),
+          sound_field(bone),
           sound_atlas(fuzz::sample_atlas(plain)),
           sound_atlas(fuzz::sample_atlas(mean_removed)),
           sound_atlas(fuzz::sample_atlas(filtered))};
@@ -181,12 +181,6 @@ Handle any_creation(hid_t space, fuzz::InputBytes& input) {
       if (input.take_below(2) == 0) H5Pset_deflate(creation, 1);
       if (input.take_below(4) == 0) H5Pset_fletcher32(creation);
       if (input.take_below(4) == 0) H5Pset_nbit(creation);
-      if (input.take_below(4) == 0) {
-        std::array<unsigned, 5> parameters = {1};
-        std::copy(chunk.begin(), chunk.begin() + 4, parameters.begin() + 1);
-        if (input.take_below(4) == 0) parameters[input.take_below(5)] = input.take<std::uint16_t>();
-        H5Pset_filter(creation, hdf5::kIndexFilter, 0, parameters.size(), parameters.data());
-      }
       break;
     case 2:
       H5Pset_external(creation, (fuzz::scratch_folder() / kElsewhere).c_str(), 0, H5F_UNLIMITED);
@@ -307,8 +301,7 @@ void mend_payload_hash(hid_t file, const SoundFile& sound) {
     datasets.push_back(hdf5::read_dataset(file, rule, "field"));
   std::vector<std::string> index_sha256;
   for (const DatasetRule& rule : sound.indices) {
-    const Handle dataset(H5Dopen2(file, rule.name.c_str(), H5P_DEFAULT), H5Dclose, "H5Dopen2");
-    index_sha256.push_back(hdf5::read_text_attribute(dataset, "sha256"));
+    index_sha256.push_back(hdf5::stated_sha256(file, rule.name));
   }
   H5Adelete(file, "payload_sha256");
   hdf5::write_text_attribute(
@@ -356,7 +349,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const SoundFile& sound = files[input.take<std::uint8_t>() % files.size()];
   const auto path = fuzz::written("field.af.h5", sound.bytes);
   {
-    const hdf5::IndexFilter filter(sound.codebook);
     const Handle file = hdf5::open_file(path, H5F_ACC_RDWR);
     constexpr int kMostEdits = 6;
     for (int edits = 0; edits < kMostEdits && !input.empty(); ++edits)

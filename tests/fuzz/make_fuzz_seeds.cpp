@@ -14,7 +14,6 @@
 #include "base/stored_bytes.h"
 #include "camera_files/camera_formats.h"
 #include "evaluate/registration/registration_rows.h"
-#include "field/index_coding.h"
 #include "files/output_file.h"
 #include "hdf5_files/hdf5_output.h"
 #include "image_files/ct_reader.h"
@@ -380,24 +379,6 @@ void write_dicom_xray_seeds(const fs::path& folder) {
   write("lut", '\x20', with_lut);
 }
 
-/// As fuzz_index_coding takes it apart: two codewords, extents, a chunk.
-void write_index_coding_seeds(const fs::path& folder) {
-  Codebook codebook{{Tile{}, Tile{}, Tile{}}};
-  codebook.codewords[1].fill(0x0101);
-  codebook.codewords[2].fill(0x0202);
-  const std::vector<std::uint8_t> chunk =
-      IndexCoding(codebook).encode(std::vector<std::uint16_t>{0, 1, 1, 2, 0, 2}, {1, 1, 2, 3});
-  write_seed(folder / "index_coding" / "chunk",
-             "\2\0"s + std::string(32, '\1') + std::string(32, '\2') + "\0\0\0\0\0\0\1\0\2\0"s +
-                 std::string(chunk.begin(), chunk.end()));
-  codebook.mean_step = 1 + 48;
-  const std::vector<std::uint8_t> with_means = IndexCoding(codebook).encode(
-      std::vector<std::uint16_t>{0, 1, 1, 0, 490, 539, 2, 0, 2, 0, 0, 980}, {1, 1, 2, 3});
-  write_seed(folder / "index_coding" / "means",
-             "\2\0"s + std::string(32, '\1') + std::string(32, '\2') +
-                 "\1\0\x30\0\0\0\0\0\1\0\2\0"s + std::string(with_means.begin(), with_means.end()));
-}
-
 void write_other_seeds(const fs::path& folder) {
   write_seed(folder / "journal" / "manifest",
              "\0{\"format\": \"af-progress-journal\", \"format_version\": 4, \"decides\": "
@@ -511,7 +492,6 @@ int main(int argc, char** argv) {
     write_image_seeds(folder);
     write_dicom_seeds(folder);
     write_dicom_xray_seeds(folder);
-    write_index_coding_seeds(folder);
     write_found_poses_seeds(folder);
     write_dicom_ct_seeds(folder);
     write_inspect_seeds(folder);

@@ -84,9 +84,7 @@ std::vector<IndexBlock> my_blocks(const AttenuationAtlas& atlas, const Communica
   return blocks;
 }
 
-FieldFileInfo write(const AttenuationAtlas& atlas,
-                    const std::filesystem::path& path,
-                    IndexPacking packing = IndexPacking::CodebookTree) {
+FieldFileInfo write(const AttenuationAtlas& atlas, const std::filesystem::path& path) {
   const Communicator world = Communicator::world();
   std::error_code ignored;
   if (world.is_root()) std::filesystem::remove(path, ignored);
@@ -99,9 +97,7 @@ FieldFileInfo write(const AttenuationAtlas& atlas,
         return FieldProvenance{"0.1.0", "af-precompute", "look_up = \"cubic\"\n", "{}"};
       },
       path,
-      world,
-      {},
-      packing);
+      world);
 }
 
 void edit(const std::filesystem::path& path, const std::function<void(hid_t)>& change) {
@@ -248,7 +244,7 @@ TEST(AtlasFile, RefusesACodebookThatIsNotItsOwn) {
   // One with too few codewords for the indices, though all hashes agree.
   AttenuationAtlas few = small_atlas();
   few.codebook.codewords.resize(3);
-  const std::string sha256 = write(few, folder / "b.h5", IndexPacking::Deflate).payload_sha256;
+  const std::string sha256 = write(few, folder / "b.h5").payload_sha256;
   const std::string message =
       refusal_of([&] { read_atlas_member(folder / "b.h5", 0, sha256, Communicator::world()); });
   EXPECT_NE(message.find("/member_0/field/slab_0 has an index beyond the 3 codewords"),

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "field_file/field_layout.h"
+#include "field_file/field_writing.h"
 #include "files/output_file.h"
 #include "register/results/registration_columns.h"
 #include "register/results/registration_results.h"
@@ -63,15 +64,16 @@ std::string file_page() {
       << template_text("scan") << "```\n\n## Fields (`.af.h5`)\n\nHDF5, format "
       << field_layout::kFormat << ", version " << field_layout::kFormatVersion
       << ". A field of several depth slabs has `/geometry/slab_1/`, `/field/slab_1` and so on. "
-      << "`/field/slab_0` holds the codeword of each tile, uint16, by (u, v, s, t). Fields of "
-      << "mean-removed tiles (version 3, attribute `tile_coding`) have `/codebook/mean_step`; in "
-      << "`/field/slab_0` a row of codewords along t and the row of their tiles' means, in levels, "
-      << "take turns along s. Codeword 0 is an empty tile; the level of any other tile's element "
-      << "is its mean + the codeword's element - 32768, within 0 and 65535. Versions 1 and 2 are "
-      << "fields of plain tiles, deflated and packed by the codebook's tree. Version 4 has "
-      << "`/codebook/tile_filter`, the weights by which decoded tiles are corrected "
-      << "([how](../../precompute/README.md#tile-filter)), and states `tile_coding` "
-      << "for plain tiles, too. "
+      << "`/field/slab_0/codewords` holds the codeword of each tile, uint16, by (u, v, s, t). "
+      << "Fields of mean-removed tiles have `/codebook/mean_step`, and in `/field/slab_0/means` "
+         "the "
+      << "means of the tiles in levels, uint16, by (u, v, t, s). Along t a mean is stored as the "
+      << "difference from the one before, modulo 65536, but every " << kMeanRunTiles
+      << "th as it is, from the first on. Codeword 0 is an empty tile; the level of any other "
+      << "tile's element is its mean + the codeword's element - 32768, within 0 and 65535. Fields "
+      << "with a tile filter have `/codebook/tile_filter`, the weights by which decoded tiles are "
+      << "corrected ([how](../../precompute/README.md#tile-filter)). Chunks are shuffled, deflated "
+      << "and carry HDF5's Fletcher-32. "
       << "[Frames](../../common/geometry/README.md), "
       << "[coding](../coding.md).\n\n"
       << dataset_table() << "\nAn atlas (`af-precompute --orbit`, [page](../other-cameras.md)) has "

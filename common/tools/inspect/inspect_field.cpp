@@ -176,7 +176,6 @@ void inspect_field(const std::filesystem::path& path,
   facts["quantizer_step"] =
       atlas != nullptr ? atlas->quantizer_step : opened.field()->quantizer_step;
   facts["look_up"] = info.look_up;
-  facts["index_packing"] = info.packing == IndexPacking::CodebookTree ? "codebook-tree" : "deflate";
   facts["sizes"] =
       sizes_json(atlas != nullptr ? atlas->lattice() : opened.field()->lattice(), info);
   facts["provenance"] = provenance_json(info.provenance);

@@ -78,24 +78,6 @@ TEST(PrecomputeOptions, TrainLongerForOneSlabUnlessTold) {
   EXPECT_FALSE(problems(options).empty());
 }
 
-TEST(PrecomputeOptions, PackByTheCodebooksTreeUnlessTheyCompareWithThePaper) {
-  PrecomputeOptions options;
-  EXPECT_TRUE(options.packs_by_codebook_tree());
-  EXPECT_EQ(options.in_force().index_packing, "codebook-tree");
-  EXPECT_TRUE(options.in_force().packs_by_codebook_tree()) << "although its parts are stated";
-  options.index_packing = "deflate";
-  EXPECT_FALSE(options.packs_by_codebook_tree());
-  options.index_packing.reset();
-  options.preset = "paper";
-  EXPECT_FALSE(options.packs_by_codebook_tree());
-  options.preset.reset();
-  options.uv_nodes = 8;
-  EXPECT_FALSE(options.packs_by_codebook_tree());
-  EXPECT_EQ(options.in_force().index_packing, "deflate");
-  options.preset = "standard";
-  EXPECT_TRUE(options.packs_by_codebook_tree());
-}
-
 TEST(FieldDesignOfOptions, IsThePapersByName) {
   PrecomputeOptions options;
   options.preset = "paper";
