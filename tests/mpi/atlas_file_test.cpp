@@ -86,9 +86,7 @@ std::vector<IndexBlock> my_blocks(const AttenuationAtlas& atlas, const Communica
 
 FieldFileInfo write(const AttenuationAtlas& atlas, const std::filesystem::path& path) {
   const Communicator world = Communicator::world();
-  std::error_code ignored;
-  if (world.is_root()) std::filesystem::remove(path, ignored);
-  world.barrier();
+  test::remove_shared_file(path);
   std::vector<IndexBlock> left = my_blocks(atlas, world);
   return write_atlas(
       atlas,

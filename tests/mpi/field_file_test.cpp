@@ -116,9 +116,7 @@ FieldProvenance some_provenance() {
 FieldFileInfo write(const CompressedAttenuationField& field, const std::filesystem::path& path) {
   const Communicator world = Communicator::world();
   // A program never replaces what it has read.
-  std::error_code ignored;
-  if (world.is_root()) std::filesystem::remove(path, ignored);
-  world.barrier();
+  test::remove_shared_file(path);
   return write_field(field, dealt(all_blocks(field), world), some_provenance(), path, world);
 }
 
@@ -789,9 +787,7 @@ TEST(FieldFile, HoldsAFilterBesideTheCodebook) {
     field.codebook.filter = some_filter();
     const auto blocks = has_means ? blocks_with_means(field) : all_blocks(field);
     const auto path = folder / "a.af.h5";
-    std::error_code ignored;
-    if (world.is_root()) std::filesystem::remove(path, ignored);
-    world.barrier();
+    test::remove_shared_file(path);
     write_field(field, dealt(blocks, world), some_provenance(), path, world);
     const auto read = read_field(path, world);
     EXPECT_EQ(read->codebook.mean_step, field.codebook.mean_step);
@@ -807,9 +803,7 @@ TEST(FieldFile, RefusesAFilterThatIsNoneOrNotStated) {
   CompressedAttenuationField field = small_field();
   const auto write = [&](const TileFilter& filter) {
     field.codebook.filter = filter;
-    std::error_code ignored;
-    if (world.is_root()) std::filesystem::remove(folder / "a.af.h5", ignored);
-    world.barrier();
+    test::remove_shared_file(folder / "a.af.h5");
     write_field(
         field, dealt(all_blocks(field), world), some_provenance(), folder / "a.af.h5", world);
   };
@@ -839,9 +833,7 @@ TEST(FieldFile, RefusesMeansThatMakeNoSense) {
         CompressedAttenuationField field = field_with_means();
         std::vector<IndexBlock> blocks = blocks_with_means(field);
         spoil(field, blocks);
-        std::error_code ignored;
-        if (world.is_root()) std::filesystem::remove(folder / "a.af.h5", ignored);
-        world.barrier();
+        test::remove_shared_file(folder / "a.af.h5");
         write_field(field, dealt(blocks, world), some_provenance(), folder / "a.af.h5", world);
         return refusal(folder / "a.af.h5");
       };

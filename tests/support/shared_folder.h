@@ -4,13 +4,15 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <system_error>
 
 #include "parallel/communicator.h"
 #include "support/test_paths.h"
 
 namespace af::test {
 
-/// A folder that all ranks share. Collective.
+/// A folder that all ranks share. Made and removed by all of them together, so that none removes
+/// what another still reads. Collective.
 class SharedFolder {
  public:
   SharedFolder() {
@@ -22,6 +24,10 @@ class SharedFolder {
     world_.broadcast(path);
     path_ = path;
   }
+  ~SharedFolder() { world_.barrier(); }
+  SharedFolder(const SharedFolder&) = delete;
+  SharedFolder& operator=(const SharedFolder&) = delete;
+
   std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
 
  private:
@@ -29,5 +35,14 @@ class SharedFolder {
   std::unique_ptr<ScratchFolder> folder_;
   std::filesystem::path path_;
 };
+
+/// Removes a file that all ranks share, once none of them reads it any more. Collective.
+inline void remove_shared_file(const std::filesystem::path& path) {
+  const Communicator world = Communicator::world();
+  world.barrier();
+  std::error_code ignored;
+  if (world.is_root()) std::filesystem::remove(path, ignored);
+  world.barrier();
+}
 
 }  // namespace af::test
