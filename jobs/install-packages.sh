@@ -13,7 +13,7 @@ base_packages=(
   libeigen3-dev libcli11-dev libtomlplusplus-dev nlohmann-json3-dev libnlopt-dev libspdlog-dev libssl-dev libboost-math-dev
   libgtest-dev libgmock-dev
   python3-dev python3-numpy pybind11-dev python3-wheel
-  libcairo2-dev libexpat1-dev fonts-dejavu-core gnuplot-nox
+  libcairo2-dev libexpat1-dev fonts-dejavu-core python3-jinja2 python3-matplotlib
   dpkg-dev file
   invesalius-examples
 )

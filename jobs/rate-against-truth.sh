@@ -84,12 +84,11 @@ IFS=, read -r -a view_list <<<"$views"
 for count in "${view_list[@]}"; do
   [[ "$count" == [12] ]] || die 2 "--views = '$views' must name 2, 1 or both"
 done
-command -v gnuplot >/dev/null || die 4 "gnuplot is missing: jobs/install-packages.sh installs it"
 
 # --- stages ------------------------------------------------------------------------------------------------------
 
 bin=$(program_folder)
-need_programs "$bin" af-simulate af-precompute af-evaluate
+need_programs "$bin" af-simulate af-precompute af-evaluate af-report
 open_output "$output"
 mkdir -p "$output"/{studies,fields,quality,starts,runs,lattice}
 # Another build leaves what was measured: one changes a part of the programs and does that part again.
@@ -244,100 +243,6 @@ all_rows() {
   done | sort -t, -k3,3nr -k2,2 -k1,1 -k9,9g
 }
 
-# table CSV TITLE COLUMN...: for each kind of X-rays a table, a row per design, a column per anatomy; the cells hold the
-# columns.
-table() {
-  local csv=$1 title=$2
-  shift 2
-  awk -F, -v title="$title" -v columns="$*" '
-    NR == 1 { next }
-    {
-      group = $2 ", " ($3 == 2 ? "two views" : "one view")
-      if (!(group in groups)) group_names[++group_count] = group
-      groups[group]
-      if (!(($4) in designs)) design_names[++design_count] = $4
-      designs[$4]
-      if (!(($1) in anatomies)) anatomy_names[++anatomy_count] = $1
-      anatomies[$1]
-      count = split(columns, wanted, " ")
-      cell = ""
-      for (i = 1; i <= count; ++i) cell = cell (i > 1 ? ", " : "") $wanted[i]
-      cells[group, $4, $1] = cell
-      used[group, $4]
-    }
-    END {
-      for (g = 1; g <= group_count; ++g) {
-        header = "| " group_names[g] ": " title " |"
-        line = "|---|"
-        for (a = 1; a <= anatomy_count; ++a) {
-          header = header " " anatomy_names[a] " |"
-          line = line "---|"
-        }
-        print header "\n" line
-        for (d = 1; d <= design_count; ++d) {
-          if (!((group_names[g], design_names[d]) in used)) continue
-          row = "| " design_names[d] " |"
-          for (a = 1; a <= anatomy_count; ++a) row = row " " cells[group_names[g], design_names[d], anatomy_names[a]] " |"
-          print row
-        }
-        print ""
-      }
-    }' "$csv"
-}
-
-# panel CSV COLUMN VARIANT VIEWS TITLE: data and plot command of one panel. Designs whose names are budgets, such as 2MB,
-# are joined; others are marks: a square is paper, a diamond standard, a circle any other. Nothing where there is no such
-# row.
-panel() {
-  sort -t, -k9,9g "$1" | awk -F, -v column="$2" -v variant="$3" -v count="$4" -v title="$5" -v order="$(cut -d, -f 1 "$1" | sed 1d | sort -u | tr '\n' ' ')" '
-    $2 == variant && $3 == count && $column > 0 {
-      kind = $4 ~ /MB$/ ? "budgets" : $4 == "paper" || $4 == "standard" ? $4 : "other"
-      points[$1, kind] = points[$1, kind] $9 " " $column "\n"
-    }
-    END {
-      split("#0072B2 #D55E00 #009E73 #CC79A7 #E69F00 #56B4E9", colors, " ")
-      style["budgets"] = "with linespoints lw 2 pt 7 ps 0.5"
-      style["standard"] = "with points pt 13 ps 1.7"
-      style["other"] = "with points pt 6 ps 0.9"
-      style["paper"] = "with points pt 4 ps 1.2 lw 2"
-      anatomies = split(order, names, " ")
-      for (i = 1; i <= anatomies; ++i)
-        for (kind in style) {
-          if (!((names[i], kind) in points)) continue
-          printf "$%s%d << EOD\n%sEOD\n", kind, i, points[names[i], kind]
-          plots = plots (plots == "" ? "" : ", ") sprintf("$%s%d %s lc rgb \"%s\" %s", kind, i, style[kind], colors[(i - 1) % 6 + 1],
-            kind == "standard" ? "title \"" names[i] "\"" : "notitle")
-        }
-      if (plots != "") printf "set title \"%s\"\nplot %s\n", title, plots
-    }'
-}
-
-# figure NAME ROWS: draws panels from the standard input, in rows of two, as SVG and PNG.
-figure() {
-  local panels terminal
-  panels=$(cat)
-  for terminal in svg pngcairo; do
-    cat <<TEXT
-set terminal $terminal size 1100,$((340 * $2)) font "sans-serif,12"
-set output "$output/$1.${terminal%cairo}"
-set border lc rgb "#6B7A8C"
-set grid lc rgb "#D8DEE6"
-set tics textcolor rgb "#6B7A8C"
-set title textcolor rgb "#6B7A8C"
-set key outside right top textcolor rgb "#6B7A8C" samplen 1
-set logscale x 2
-set xrange [*<1:128]
-set xtics (0.25, 0.5, 1, 2, 4, 8, 16, 32)
-set xlabel "MB per camera" textcolor rgb "#6B7A8C"
-set multiplot layout $2,2
-$panels
-unset multiplot
-reset
-TEXT
-  done >"$output/$1.gnuplot"
-  gnuplot -d "$output/$1.gnuplot"
-}
-
 # --- everything --------------------------------------------------------------------------------------------------
 
 for ct in "${cts[@]}"; do
@@ -356,24 +261,5 @@ csv="$output/rate-against-truth.csv"
   echo "anatomy,variant,views,design,slabs,uv_nodes,st_nodes,codewords,mb_per_camera,psnr_db,drr_ms,registration_ms,raycast_ms,starts,median_distance_mm,p95_distance_mm,max_distance_mm"
   all_rows
 } >"$csv"
-{
-  table "$csv" "MB per camera, dB, mm" 9 10 15
-  table "$csv" "ms of a DRR, of a registration by field, by ray casting" 11 12 13
-} >"${csv%.csv}.md"
-{
-  panel "$csv" 10 clean 2 "PSNR, dB, clean"
-  echo "set logscale y 2"
-  panel "$csv" 11 clean 2 "DRR, ms, clean"
-  for variant in clean stressed; do
-    panel "$csv" 12 "$variant" 2 "registration, ms: $variant, two views"
-  done
-} | figure rate 2
-{
-  echo "set logscale y"
-  for count in 2 1; do
-    for variant in clean stressed; do
-      panel "$csv" 15 "$variant" "$count" "from ray casting's end, mm: $variant, views: $count"
-    done
-  done
-} | figure distance 2
+"$bin/af-report" "$csv" >"$output/logs/report.log"
 say "Tables: ${csv%.csv}.md, $csv; curves: $output/rate.png, $output/distance.png, and SVG"

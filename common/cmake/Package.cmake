@@ -8,13 +8,13 @@ set(af_programs af-precompute af-drr af-simulate af-scan af-register af-evaluate
 
 # Manual pages and completions are asked of the programs when they are installed, so that they cannot differ from them.
 # The file's destination is relative to the prefix, and DESTDIR stands before it, as with everything that is installed.
-function(af_install_help program format destination)
+function(af_install_help command format destination)
   install(
     CODE "
       set(file \"${CMAKE_CURRENT_BINARY_DIR}/help/${destination}\")
       get_filename_component(folder \"\${file}\" DIRECTORY)
       file(MAKE_DIRECTORY \"\${folder}\")
-      execute_process(COMMAND \"$<TARGET_FILE:${program}>\" --help-as ${format} OUTPUT_FILE \"\${file}\"
+      execute_process(COMMAND \"${command}\" --help-as ${format} OUTPUT_FILE \"\${file}\"
                       COMMAND_ERROR_IS_FATAL ANY)
       if(\"${format}\" STREQUAL man)
         execute_process(COMMAND gzip -9nf \"\${file}\" COMMAND_ERROR_IS_FATAL ANY)
@@ -23,11 +23,25 @@ function(af_install_help program format destination)
       get_filename_component(folder \"${destination}\" DIRECTORY)
       file(INSTALL \"\${file}\" DESTINATION \"\${CMAKE_INSTALL_PREFIX}/\${folder}\")")
 endfunction()
+function(af_install_helps program command)
+  af_install_help(${command} man ${CMAKE_INSTALL_MANDIR}/man1/${program}.1)
+  af_install_help(${command} bash ${CMAKE_INSTALL_DATADIR}/bash-completion/completions/${program})
+  af_install_help(${command} zsh ${CMAKE_INSTALL_DATADIR}/zsh/vendor-completions/_${program})
+endfunction()
 foreach(program ${af_programs})
-  af_install_help(${program} man ${CMAKE_INSTALL_MANDIR}/man1/${program}.1)
-  af_install_help(${program} bash ${CMAKE_INSTALL_DATADIR}/bash-completion/completions/${program})
-  af_install_help(${program} zsh ${CMAKE_INSTALL_DATADIR}/zsh/vendor-completions/_${program})
+  af_install_helps(${program} $<TARGET_FILE:${program}>)
 endforeach()
+
+# Programs in Python: python/NAME and a folder of its modules. In the build tree they stand beside the other programs, too.
+function(af_add_python_program program modules)
+  file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/bin)
+  file(CREATE_LINK ${PROJECT_SOURCE_DIR}/python/${program} ${PROJECT_BINARY_DIR}/bin/${program} SYMBOLIC)
+  install(PROGRAMS python/${program} DESTINATION ${CMAKE_INSTALL_BINDIR})
+  install(DIRECTORY python/${modules} DESTINATION ${CMAKE_INSTALL_DATADIR}/attenuation-fields
+          PATTERN "__pycache__" EXCLUDE)
+  af_install_helps(${program} ${PROJECT_SOURCE_DIR}/python/${program})
+endfunction()
+af_add_python_program(af-report af_report)
 
 # A folder for Slicer, which starts every program of the folders that it searches for modules.
 foreach(program af-drr af-register)

@@ -15,12 +15,10 @@
 #include "evaluate/image_quality/image_quality_tables.h"
 #include "evaluate/image_quality/loss_split.h"
 #include "evaluate/image_quality/loss_split_tables.h"
-#include "evaluate/outputs/paper_setting.h"
-#include "evaluate/outputs/result_figures.h"
 #include "evaluate/outputs/row_gathering.h"
 #include "evaluate/outputs/sample_summary_json.h"
+#include "evaluate/report/report_program.h"
 #include "field_use/opened_field.h"
-#include "figures/gnuplot_figure.h"
 #include "figures/picture.h"
 #include "files/output_file.h"
 #include "files/resource_check.h"
@@ -57,7 +55,6 @@ struct TargetResult {
   std::string camera;
   std::vector<DrrComparison> comparisons;
   std::vector<PicturePanel> worst_pair;
-  bool is_papers_setting = false;  ///< rank 0
 
   [[nodiscard]] std::string label() const {
     return (case_name.empty() ? "camera" : case_name) + " " + camera;
@@ -218,17 +215,6 @@ void write_pair(const std::vector<PicturePanel>& panels,
                 zoom_of(panels.front().image));
 }
 
-PaperLevels levels_for(bool is_papers_setting) {
-  return is_papers_setting ? PaperLevels::Shown : PaperLevels::Hidden;
-}
-
-PsnrGroup group_of(const TargetResult& result) {
-  PsnrGroup group{result.label(), {}};
-  for (const DrrComparison& comparison : result.comparisons)
-    group.psnr_db.push_back(comparison.psnr_db);
-  return group;
-}
-
 void write_results(const ImageQualityOptions& options,
                    const Target& target,
                    const Setup& setup,
@@ -241,12 +227,9 @@ void write_results(const ImageQualityOptions& options,
   // From here on the results of an earlier run in this folder are incomplete.
   remove_output(folder / "summary.json");
   write_text_file(folder / "image-quality.csv", image_quality_table(comparisons).to_text());
-  const PsnrGroup group = group_of(result);
   json field = field_description(
       setup.field->identity(), *setup.field->coverage().planes.front(), setup.field->codewords());
   if (setup.field->atlas()) field["members"] = setup.field->coverage().planes.size();
-  result.is_papers_setting = is_papers_setting(field) && !setup.has_fitted_viewpoints();
-  draw_psnr_boxes({group}, levels_for(result.is_papers_setting), folder / "psnr");
   json summary = {{"format", "attenuation-fields evaluation"},
                   {"format_version", 1},
                   {"kind", "image-quality"}};
@@ -271,6 +254,7 @@ void write_results(const ImageQualityOptions& options,
     summary["figures"].push_back("loss-split");
   }
   summary["field"] = field;
+  summary["has_fitted_viewpoints"] = setup.has_fitted_viewpoints();
   summary["field"]["file_bytes"] = setup.field->info().file_bytes;
   summary["field"]["payload_bytes"] = setup.field->info().payload_bytes;
   summary["look_up"] = setup.look_up(options);
@@ -280,11 +264,11 @@ void write_results(const ImageQualityOptions& options,
 
   const SampleSummary psnr = [&] {
     std::vector<double> values;
-    for (const double value : group.psnr_db)
-      if (!std::isnan(value)) values.push_back(value);
+    for (const DrrComparison& comparison : comparisons)
+      if (!std::isnan(comparison.psnr_db)) values.push_back(comparison.psnr_db);
     return summarize(values);
   }();
-  std::cout << group.label << ": PSNR median " << fixed_text(psnr.median, 2)
+  std::cout << result.label() << ": PSNR median " << fixed_text(psnr.median, 2)
             << " dB, 5th percentile " << fixed_text(psnr.percentile_5, 2) << ", minimum "
             << fixed_text(psnr.minimum, 2) << " over " << psnr.count
             << " poses\nresults: " << folder.string() << '\n';
@@ -435,7 +419,6 @@ void write_together(const std::vector<TargetResult>& results, const std::filesys
   const std::vector<std::string> own_columns = image_quality_table({}).columns();
   columns.insert(columns.end(), own_columns.begin(), own_columns.end());
   CsvTable table(columns);
-  std::vector<PsnrGroup> groups;
   std::vector<PicturePanel> panels;
   for (const TargetResult& result : results) {
     const CsvTable own = image_quality_table(result.comparisons);
@@ -444,22 +427,15 @@ void write_together(const std::vector<TargetResult>& results, const std::filesys
       for (const std::string& column : own_columns) fields.push_back(own.text(row, column));
       table.add_row(std::move(fields));
     }
-    groups.push_back(group_of(result));
     panels.insert(panels.end(), result.worst_pair.begin(), result.worst_pair.end());
   }
   write_text_file(folder / "image-quality.csv", table.to_text());
-  const bool are_papers =
-      std::all_of(results.begin(), results.end(), [](const TargetResult& result) {
-        return result.is_papers_setting;
-      });
-  draw_psnr_boxes(groups, levels_for(are_papers), folder / "psnr");
   write_picture(panels,
                 3,
                 "The worst pair of every field",
                 folder / "worst-pairs.png",
                 zoom_of(panels.front().image));
-  std::cout << "all fields: " << (folder / "psnr.svg").string() << ", "
-            << (folder / "worst-pairs.png").string() << '\n';
+  std::cout << "all fields: " << (folder / "worst-pairs.png").string() << '\n';
 }
 
 }  // namespace
@@ -525,10 +501,7 @@ namespace {
 void run_image_quality(const ImageQualityOptions& options,
                        const std::string& command_line,
                        const Communicator& world) {
-  all_or_none(world, [&] {
-    throw_if_any(problems(options));
-    if (world.is_root()) require_gnuplot();
-  });
+  all_or_none(world, [&] { throw_if_any(problems(options)); });
   RunFolder run({options.output_folder,
                  {"image-quality.csv", "reproduce.sh", "summary.json"},
                  options.resume.restarts},
@@ -541,8 +514,14 @@ void run_image_quality(const ImageQualityOptions& options,
     results.push_back(evaluate_target(options, target, command_line, run, world));
   all_or_none(world, [&] {
     if (!world.is_root()) return;
-    if (!options.study.empty()) write_together(results, options.output_folder);
+    std::vector<std::string> drawn;
+    for (const Target& target : targets) drawn.push_back(target.folder.string());
+    if (!options.study.empty()) {
+      write_together(results, options.output_folder);
+      drawn.push_back(options.output_folder.string());
+    }
     run.finish();
+    draw_results(drawn, world);
   });
 }
 

@@ -6,7 +6,6 @@
 #include <string>
 #include <utility>
 
-#include "evaluate/outputs/result_figures.h"
 #include "evaluate/outputs/sample_summary_json.h"
 #include "files/output_file.h"
 #include "text/csv_table.h"
@@ -47,13 +46,11 @@ double mean_of_part(const std::vector<LossSplit>& splits, std::size_t part) {
 
 json write_loss_split(const std::vector<LossSplit>& splits, const std::filesystem::path& folder) {
   write_text_file(folder / "loss-split-poses.csv", splits_table(splits).to_text());
-  std::vector<PsnrGroup> groups;
   json parts = json::array();
   for (std::size_t part = 0; part < LossSplit::kParts; ++part) {
     std::vector<double> values;
     for (const LossSplit& split : splits)
       if (const double value = split.psnr_db()[part]; !std::isnan(value)) values.push_back(value);
-    groups.push_back({kLabels[part], values});
     parts.push_back(
         {{"name", LossSplit::kNames[part]},
          {"label", kLabels[part]},
@@ -61,7 +58,6 @@ json write_loss_split(const std::vector<LossSplit>& splits, const std::filesyste
          {"share_of_total",
           number_json(mean_of_part(splits, part) / mean_of_part(splits, LossSplit::kParts - 1))}});
   }
-  draw_psnr_boxes(groups, PaperLevels::Hidden, folder / "loss-split");
   return {{"poses", splits.size()}, {"parts", parts}};
 }
 

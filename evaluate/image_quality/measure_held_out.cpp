@@ -7,11 +7,11 @@
 #include <optional>
 
 #include "base/error.h"
-#include "base/sample_summary.h"
 #include "base/thread_pool.h"
 #include "drr/field_renderer.h"
 #include "drr/ray_cast_drr.h"
 #include "evaluate/outputs/table_paths.h"
+#include "evaluate/report/report_program.h"
 #include "field_use/opened_field.h"
 #include "files/output_file.h"
 #include "image/gaussian_blur.h"
@@ -125,45 +125,16 @@ void judge_view(const HeldOutOptions& options,
   }
 }
 
-CsvTable rows_table(const std::vector<HeldOutRow>& rows) {
-  CsvTable table({"case", "camera", "prediction", "psnr_db", "smoothed_psnr_db"});
+CsvTable rows_table(const std::vector<HeldOutRow>& rows, double smoothing_px) {
+  CsvTable table({"case", "camera", "prediction", "psnr_db", "smoothed_psnr_db", "smoothing_px"});
   for (const HeldOutRow& row : rows)
     table.add_row({row.case_name,
                    row.camera,
                    row.predictor,
                    number_text(row.psnr_db),
-                   number_text(row.smoothed_psnr_db)});
+                   number_text(row.smoothed_psnr_db),
+                   number_text(smoothing_px)});
   return table;
-}
-
-std::string mean_and_least(std::vector<double> values) {
-  const SampleSummary summary = summarize(std::move(values));
-  return fixed_text(summary.mean, 2) + " (" + fixed_text(summary.minimum, 2) + ")";
-}
-
-std::string markdown(const HeldOutOptions& options,
-                     const HeldOutRows& found,
-                     const std::vector<std::string>& case_names,
-                     const std::vector<Predictor>& predictors) {
-  std::string text = "| Case | Prediction | Views | PSNR, mean (least) dB | smoothed by " +
-                     number_text(options.smoothing_px) + " px |\n|---|---|---:|---:|---:|\n";
-  for (const std::string& case_name : case_names)
-    for (const Predictor& predictor : predictors) {
-      std::vector<double> raw;
-      std::vector<double> smoothed;
-      for (const HeldOutRow& row : found.rows) {
-        if (row.case_name != case_name || row.predictor != predictor.name) continue;
-        raw.push_back(row.psnr_db);
-        smoothed.push_back(row.smoothed_psnr_db);
-      }
-      if (raw.empty()) continue;
-      text += "| " + case_name + " | " + predictor.name + " | " + std::to_string(raw.size()) +
-              " | " + mean_and_least(raw) + " | " + mean_and_least(smoothed) + " |\n";
-    }
-  if (found.views_outside > 0)
-    text += "\n" + std::to_string(found.views_outside) +
-            " views are left out: a field does not hold all rays of their regions.\n";
-  return text;
 }
 
 /// Collective. Ray casting first, then the fields under their files' names.
@@ -219,8 +190,9 @@ void HeldOutOptions::describe(Fields& field_list) {
              "deviation in pixels")
       .within(0.0, 100.0);
   field_list("threads", threads, "Threads; 0: every processor").within(0, 1024);
-  field_list(
-      "output", output, "Markdown file to write; a CSV of the same name is written beside it")
+  field_list("output",
+             output,
+             "Markdown file to write, by af-report; a CSV of the same name is written beside it")
       .as("-o,--output");
 }
 
@@ -257,19 +229,17 @@ void run_held_out(const HeldOutOptions& options,
   all_or_none(world, [&] {
     if (!world.is_root()) return;
     HeldOutRows found;
-    std::vector<std::string> names;
-    for (const StudyCase* study_case : chosen) {
-      names.push_back(study_case->name);
+    for (const StudyCase* study_case : chosen)
       for (const StudyView& view : study_case->views)
         judge_view(options, study, *study_case, view, predictors, found);
-    }
     if (found.rows.empty())
       throw InputError(
           "study", options.study.string(), "no view has all rays of its region in the fields");
-    const std::string text = markdown(options, found, names, predictors);
-    write_text_file(csv, rows_table(found.rows).to_text());
-    write_text_file(options.output, text);
-    std::cout << text;
+    write_text_file(csv, rows_table(found.rows, options.smoothing_px).to_text());
+    draw_results({csv.string()}, world);
+    if (found.views_outside > 0)
+      std::cout << found.views_outside
+                << " views are left out: a field does not hold all rays of their regions.\n";
   });
 }
 

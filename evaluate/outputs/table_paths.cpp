@@ -10,7 +10,7 @@ std::filesystem::path csv_beside(const std::filesystem::path& markdown) {
 }
 
 std::vector<std::string> table_problems(const std::filesystem::path& output) {
-  if (output.extension() != ".csv") return {};
+  if (output.extension() == ".md") return {};
   return {"--output = " + output.string() +
           ": must name the Markdown file, such as NAME.md; the CSV is written beside it"};
 }

@@ -4,30 +4,29 @@
 #include <iostream>
 #include <utility>
 
-#include "evaluate/population/population_figures.h"
 #include "evaluate/population/population_runs.h"
 #include "evaluate/population/population_tables.h"
-#include "figures/gnuplot_figure.h"
+#include "evaluate/report/report_program.h"
 #include "files/output_file.h"
 
 namespace af::evaluation {
 
 namespace {
 
-void write_population(const PopulationOptions& options, const PopulationReader& reader) {
+void write_population(const PopulationOptions& options,
+                      const PopulationReader& reader,
+                      const Communicator& world) {
   std::vector<PopulationGroup> groups;
   for (const PopulationCondition& condition : reader.conditions())
     for (PopulationGroup& group : groups_of(condition, reader.counting()))
       groups.push_back(std::move(group));
-  const std::string text = population_text(groups, reader.counting());
   const OutputLock lock = make_output_folder(options.output);
-  write_text_file(options.output / "population.csv", population_table(groups).to_text());
+  write_text_file(options.output / "population.csv",
+                  population_table(groups, reader.counting().success_mm).to_text());
   write_text_file(options.output / "patients.csv", patients_table(groups).to_text());
   write_text_file(options.output / "intervals.csv", intervals_table(groups).to_text());
-  draw_population_success(groups, reader.counting(), options.output / "success");
-  draw_capture_ranges(groups, reader.counting(), options.output / "capture-range");
-  write_text_file(options.output / "population.md", text);
-  std::cout << text << "results: " << options.output.string() << '\n';
+  draw_results({options.output.string()}, world);
+  std::cout << "results: " << options.output.string() << '\n';
 }
 
 }  // namespace
@@ -51,10 +50,9 @@ void run_population(const PopulationOptions& options,
                     const Communicator& world) {
   all_or_none(world, [&] {
     if (!world.is_root()) return;
-    require_gnuplot();
     PopulationReader reader(options.seed);
     for (const std::string& condition : options.conditions) reader.read(condition);
-    write_population(options, reader);
+    write_population(options, reader, world);
   });
 }
 

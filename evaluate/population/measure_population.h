@@ -21,9 +21,9 @@ struct PopulationOptions {
 };
 
 /// Rank 0. Success of finished registration runs of many patients, with intervals over patients:
-/// population.md, population.csv (conditions and groups of patients), patients.csv, intervals.csv
-/// and the figures success.svg and capture-range.svg. InputError when runs of one study differ in
-/// their intervals or threshold, or a condition holds no run.
+/// population.csv (conditions and groups of patients), patients.csv, intervals.csv; af-report makes
+/// population.md and the figures success.svg and capture-range.svg of them. InputError when runs of
+/// one study differ in their intervals or threshold, or a condition holds no run.
 cli::SubCommand population_command(CLI::App& app);
 
 }  // namespace af::evaluation

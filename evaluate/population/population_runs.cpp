@@ -81,12 +81,10 @@ void PopulationReader::read(const std::string& condition) {
   std::set<std::string> commits;
   RunOfCase run_of_case;
   for (const EvaluationRun& run : find_runs({condition.substr(equals + 1)})) {
-    if (run.kind != "registration") continue;
     check_counting(run);
     commits.insert(commit_of(run));
-    run.read_in_parts("registrations.csv", [&](const CsvTable& part) {
-      add_population_rows(part, run.folder, run_of_case, found);
-    });
+    run.read_registrations(
+        [&](const CsvTable& part) { add_population_rows(part, run.folder, run_of_case, found); });
   }
   if (found.empty())
     throw InputError("--condition", condition, "holds no finished registration run");

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <set>
 #include <utility>
 
 #include "base/joined.h"
@@ -83,106 +82,6 @@ std::vector<NamedCell> success_of(const PopulationSuccess& success) {
   return cells;
 }
 
-std::string percent(double share) {
-  return std::isfinite(share) ? fixed_text(100.0 * share, 1) : "-";
-}
-
-std::string millimetre_text(double value) {
-  return std::isfinite(value) ? fixed_text(value, 1) : "-";
-}
-
-std::string patient_cells(const PopulationSuccess& success) {
-  return std::to_string(success.patients.size()) + ", " +
-         std::to_string(success.patients_with_failures) + " | " + std::to_string(success.starts);
-}
-
-/// The ladder's thresholds that the table shows.
-constexpr std::size_t kBelow1Mm = 0;
-constexpr std::size_t kBelow5Mm = 3;
-static_assert(kLadderMm[kBelow1Mm] == 1.0 && kLadderMm[kBelow5Mm] == 5.0);
-
-std::string below_text(const PopulationSuccess& success, std::size_t threshold) {
-  return percent(static_cast<double>(success.below_ladder[threshold]) /
-                 static_cast<double>(success.starts));
-}
-
-std::string success_cells(const PopulationSuccess& success) {
-  return percent(success.rate.value) + " | " + percent(success.rate.bootstrap.low) + " to " +
-         percent(success.rate.bootstrap.high) + " | " + percent(success.rate.student.low) + " to " +
-         percent(success.rate.student.high) + " | " + below_text(success, kBelow1Mm) + " / " +
-         below_text(success, kBelow5Mm) + " | " + (success.pooled.is_whole_study() ? ">= " : "") +
-         millimetre_text(success.pooled.initial_tre_mm) + " | " +
-         (success.capture_lower_bounds > 0 ? ">= " : "") +
-         millimetre_text(success.capture_mm.value) + " (" +
-         millimetre_text(success.capture_mm.bootstrap.low) + " to " +
-         millimetre_text(success.capture_mm.bootstrap.high) + ")";
-}
-
-/// Which programs made the runs: tables that mix several say so.
-std::string commits_text(const std::vector<PopulationGroup>& groups) {
-  std::set<std::string> commits;
-  for (const PopulationGroup& group : groups) commits.insert(group.commits);
-  return "\nCommits of the programs: " + joined(commits, ", ") +
-         (commits.size() > 1 ? ". Conditions are of different programs.\n" : ".\n");
-}
-
-bool is_kind(const PopulationGroup& group) {
-  return group.group != "all" && group.group != "odd" && group.group != "even" &&
-         group.group != "real";
-}
-
-/// All patients, and the halves.
-std::string population_markdown(const std::vector<PopulationGroup>& groups, bool by_mrpd) {
-  std::string text =
-      "| Condition | Group | Patients, of whom lost a start | Starts | Success, % | Bootstrap | "
-      "Student's | Below 1 / 5 mm, % | "
-      "Capture range of all, mm | Patients' own, mean, mm | Median TRE, mm | Seconds |\n"
-      "|---|---|---|---|---|---|---|---|---|---|---|---|\n";
-  for (const PopulationGroup& group : groups)
-    if (!is_kind(group))
-      text += "| " + group.condition + " | " + group.group + " | " +
-              patient_cells(by_mrpd ? group.by_mrpd : group.by_tre) + " | " +
-              success_cells(by_mrpd ? group.by_mrpd : group.by_tre) + " | " +
-              (std::isfinite(group.median_tre_mm) ? fixed_text(group.median_tre_mm, 2) : "-") +
-              " | " + fixed_text(group.median_seconds, 3) + " |\n";
-  return text;
-}
-
-/// A column per kind of patient: success and capture range of all its starts, by TRE and by mRPD.
-std::string kinds_markdown(const std::vector<PopulationGroup>& groups) {
-  std::vector<std::string> kinds;
-  std::vector<std::string> conditions;
-  std::map<std::pair<std::string, std::string>, std::string> cells;
-  const auto add_new = [](std::vector<std::string>& names, const std::string& name) {
-    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
-  };
-  for (const PopulationGroup& group : groups) {
-    add_new(conditions, group.condition);
-    if (!is_kind(group) && group.group != "real") continue;
-    add_new(kinds, group.group);
-    cells[{group.condition, group.group}] =
-        percent(group.by_tre.rate.value) + " / " + percent(group.by_mrpd.rate.value) + ", " +
-        millimetre_text(group.by_tre.pooled.initial_tre_mm) + " / " +
-        millimetre_text(group.by_mrpd.pooled.initial_tre_mm);
-  }
-  std::string text = "| Condition |";
-  std::string line = "|---|";
-  for (const std::string& kind : kinds) {
-    text += " " + kind + " |";
-    line += "---|";
-  }
-  text += "\n" + line + "\n";
-  for (const std::string& condition : conditions) {
-    text += "| " + condition + " |";
-    for (const std::string& kind : kinds) {
-      const auto cell = cells.find({condition, kind});
-      text += " " + (cell == cells.end() ? std::string("-") : cell->second) + " |";
-    }
-    text += "\n";
-  }
-  return text;
-}
-
 }  // namespace
 
 /// All patients, the two halves, and the kinds.
@@ -206,11 +105,12 @@ std::vector<PopulationGroup> groups_of(const PopulationCondition& condition,
   return groups;
 }
 
-CsvTable population_table(const std::vector<PopulationGroup>& groups) {
+CsvTable population_table(const std::vector<PopulationGroup>& groups, double success_mm) {
   std::vector<std::string> columns{
       "condition", "group", "patients", "starts", "median_tre_mm", "median_seconds"};
   for (const char* const error : {"tre_", "mrpd_"})
     for (const NamedCell& cell : success_of({})) columns.push_back(error + cell.name);
+  columns.emplace_back("success_mm");
   columns.emplace_back("commit");
   CsvTable table(columns);
   for (const PopulationGroup& group : groups) {
@@ -222,6 +122,7 @@ CsvTable population_table(const std::vector<PopulationGroup>& groups) {
                                     number_text(group.median_seconds)};
     for (const PopulationSuccess* success : {&group.by_tre, &group.by_mrpd})
       for (NamedCell& cell : success_of(*success)) fields.push_back(std::move(cell.text));
+    fields.push_back(number_text(success_mm));
     fields.push_back(group.commits);
     table.add_row(std::move(fields));
   }
@@ -290,17 +191,6 @@ CsvTable intervals_table(const std::vector<PopulationGroup>& groups) {
     }
   }
   return table;
-}
-
-std::string population_text(const std::vector<PopulationGroup>& groups,
-                            const PopulationCounting& counting) {
-  return "By TRE below " + number_text(counting.success_mm) + " mm:\n\n" +
-         population_markdown(groups, false) +
-         "\nBy mRPD below the same, which is the one to read with one view:\n\n" +
-         population_markdown(groups, true) +
-         "\nKinds of patients: success, % (TRE / mRPD), capture range of all starts, mm (TRE / "
-         "mRPD):\n\n" +
-         kinds_markdown(groups) + commits_text(groups);
 }
 
 }  // namespace af::evaluation

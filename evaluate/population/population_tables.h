@@ -26,14 +26,11 @@ struct PopulationGroup {
 std::vector<PopulationGroup> groups_of(const PopulationCondition& condition,
                                        const PopulationCounting& counting);
 
-/// population.csv: a row per condition and group.
-CsvTable population_table(const std::vector<PopulationGroup>& groups);
+/// population.csv: a row per condition and group; `success_mm`: below which an end counts.
+CsvTable population_table(const std::vector<PopulationGroup>& groups, double success_mm);
 /// patients.csv: a row per condition and patient.
 CsvTable patients_table(const std::vector<PopulationGroup>& groups);
 /// intervals.csv: a row per condition, error and interval of initial TRE.
 CsvTable intervals_table(const std::vector<PopulationGroup>& groups);
-/// population.md: what people read of these tables.
-std::string population_text(const std::vector<PopulationGroup>& groups,
-                            const PopulationCounting& counting);
 
 }  // namespace af::evaluation

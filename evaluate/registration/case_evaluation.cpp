@@ -25,6 +25,7 @@
 #include "files/sha256.h"
 #include "gold_standard/target_box.h"
 #include "parallel/work_watch.h"
+#include "register/results/outline_picture.h"
 #include "register/results/registration_results.h"
 #include "register/results/slicer_folder.h"
 #include "register/uncertainty/pose_covariance.h"
@@ -386,6 +387,8 @@ void draw_overlays(const Method& method,
   for (const auto& [which, row] : chosen) {
     const RigidTransform pose = pose_from_parameters(
         yardstick.gold_frame, PoseParameters::from_deg_and_mm(row.final_deg_mm));
+    const RigidTransform start = pose_from_parameters(
+        yardstick.gold_frame, PoseParameters::from_deg_and_mm(row.start_deg_mm));
     const std::string slicer = "slicer/" + file_name_part(evaluation.case_name) + "-" + which;
     registration::write_slicer_folder(method.runner.problem(), pose, study_case, folder / slicer);
     for (const registration::RegistrationView& view : method.runner.problem().views) {
@@ -406,6 +409,17 @@ void draw_overlays(const Method& method,
                                      {"start_index", row.start_index},
                                      {"initial_tre_mm", row.initial_tre_mm},
                                      {"tre_mm", row.tre_mm}});
+      nlohmann::json outlines = evaluation.pictures.back();
+      outlines["file"] = file_name_part(evaluation.case_name) + "-" + which + "-" +
+                         file_name_part(camera) + "-outlines.png";
+      outlines["shows"] = "outlines";
+      registration::write_outlines(
+          view,
+          start,
+          pose,
+          evaluation.case_name + ", view " + camera + ", " + which + " result",
+          folder / outlines["file"].get<std::string>());
+      evaluation.pictures.push_back(std::move(outlines));
     }
   }
 }

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluate/registration/compare_methods.h"
 
-#include <iostream>
-
 #include "base/error.h"
 #include "evaluate/outputs/table_paths.h"
 #include "evaluate/registration/method_comparison.h"
 #include "evaluate/registration/pose_distances.h"
+#include "evaluate/report/report_program.h"
 #include "files/output_file.h"
 
 namespace af::evaluation {
@@ -15,7 +14,9 @@ void CompareOptions::describe(Fields& field) {
   field("runs", runs, "Folders of finished runs; all their subfolders are searched, too")
       .as("RUN")
       .required();
-  field("output", output, "Markdown file to write; a CSV of the same name is written beside it")
+  field("output",
+        output,
+        "Markdown file to write, by af-report; CSVs of the same name are written beside it")
       .as("-o,--output");
   field("screen", is_screen, "In Markdown, measures against optimisers instead of a row per run");
   field("pose_distances",
@@ -41,40 +42,36 @@ void run_compare(const CompareOptions& options,
     if (!world.is_root()) return;
     throw_if_any(table_problems(options.output));
     const std::filesystem::path csv = csv_beside(options.output);
-    announce_output(csv);
-    announce_output(options.output);
-    std::filesystem::path distances_csv = csv;
-    distances_csv.replace_filename(csv.stem().string() + "-pose-distances.csv");
-    std::filesystem::path patients_csv = csv;
-    patients_csv.replace_filename(csv.stem().string() + "-pose-distances-over-patients.csv");
-    if (options.with_pose_distances) {
-      announce_output(distances_csv);
-      announce_output(patients_csv);
-    }
+    const auto beside = [&](const std::string& what) {
+      return csv.parent_path() / (csv.stem().string() + "-" + what + ".csv");
+    };
+    const std::filesystem::path pairs_csv = beside("pairs");
+    const std::filesystem::path distances_csv = beside("pose-distances");
+    const std::filesystem::path patients_csv = beside("pose-distances-over-patients");
+    for (const std::filesystem::path& path :
+         {csv, options.output, pairs_csv, distances_csv, patients_csv})
+      announce_output(path);
     const std::vector<EvaluationRun> runs = find_runs(options.runs);
     const std::vector<MethodRow> rows = method_rows(runs);
     if (rows.empty())
       throw InputError("RUN", options.runs.front().string(), "holds no finished registration run");
-    std::vector<std::string> parts = {options.is_screen ? screen_markdown(rows)
-                                                        : methods_markdown(rows)};
-    std::string text;
-    if (!options.is_screen) parts.push_back(studies_markdown(rows));
-    parts.push_back(pairs_markdown(runs));
-    const std::vector<PoseDistanceRow> distances =
-        options.with_pose_distances ? pose_distances(runs) : std::vector<PoseDistanceRow>();
-    parts.push_back(pose_distances_markdown(distances));
-    const std::vector<PatientDistances> over_patients =
-        distances_over_patients(distances, options.equivalence_margin_mm);
-    parts.push_back(patient_distances_markdown(over_patients));
-    for (const std::string& part : parts)
-      if (!part.empty()) text += (text.empty() ? "" : "\n") + part;
+    const CsvTable pairs = pairs_table(runs);
+    // Of an earlier comparison these would stand in the Markdown.
+    for (const std::filesystem::path& path : {pairs_csv, distances_csv, patients_csv})
+      remove_output(path);
+    if (pairs.row_count() > 0) write_text_file(pairs_csv, pairs.to_text());
     if (options.with_pose_distances) {
+      const std::vector<PoseDistanceRow> distances = pose_distances(runs);
       write_text_file(distances_csv, pose_distances_table(distances).to_text());
-      write_text_file(patients_csv, patient_distances_table(over_patients).to_text());
+      write_text_file(
+          patients_csv,
+          patient_distances_table(distances_over_patients(distances, options.equivalence_margin_mm))
+              .to_text());
     }
     write_text_file(csv, methods_table(rows).to_text());
-    write_text_file(options.output, text);
-    std::cout << text;
+    std::vector<std::string> arguments = {csv.string()};
+    if (options.is_screen) arguments.emplace_back("--screen");
+    draw_results(arguments, world);
   });
 }
 

@@ -16,7 +16,6 @@
 #include "cli/run_limits.h"
 #include "evaluate/methods/loaded_methods.h"
 #include "evaluate/outputs/failed_start.h"
-#include "evaluate/outputs/result_figures.h"
 #include "evaluate/outputs/sample_summary_json.h"
 #include "evaluate/registration/case_evaluation.h"
 #include "evaluate/registration/case_table.h"
@@ -24,8 +23,7 @@
 #include "evaluate/registration/found_poses.h"
 #include "evaluate/registration/paired_statistics.h"
 #include "evaluate/registration/registration_statistics.h"
-#include "evaluate/report/number_html.h"
-#include "figures/gnuplot_figure.h"
+#include "evaluate/report/report_program.h"
 #include "files/output_file.h"
 #include "files/sha256.h"
 #include "gold_standard/target_box.h"
@@ -201,20 +199,6 @@ void add_gold_uncertainty(const std::vector<CaseEvaluation>& evaluations, json& 
   }
 }
 
-void draw_figures(const RegistrationStudyOptions& options, std::span<const RegistrationRow> rows) {
-  std::vector<OutcomeGroup> groups;
-  for (const std::string& renderer : options.renderers())
-    groups.push_back(
-        {renderer == "raycast" ? "ray casting" : renderer, outcomes_of(rows, renderer)});
-  const std::filesystem::path& folder = options.output_folder;
-  const double success_mm = options.success_tre_mm;
-  draw_success_rates(
-      groups, options.intervals, options.interval_width_mm, folder / "success-rate", success_mm);
-  draw_tre_histogram(groups, folder / "tre-histogram", success_mm);
-  draw_tre_scatter(
-      groups, options.intervals * options.interval_width_mm, folder / "tre-scatter", success_mm);
-}
-
 json summary_json(const RegistrationStudyOptions& options,
                   const Study& study,
                   const std::vector<CaseEvaluation>& evaluations,
@@ -310,7 +294,8 @@ void print_outcome(const json& summary,
               << number_text(number_of(summary["success_tre_mm"])) << " mm)";
     std::cout << mean_text(renderer);
     const double seconds = number_of(renderer["seconds"]["median"]);
-    if (std::isfinite(seconds)) std::cout << ", median " << seconds_text(seconds) << " each";
+    if (std::isfinite(seconds))
+      std::cout << ", median " << fixed_text(1000.0 * seconds, 1) << " ms each";
     std::cout << '\n';
   }
   for (const json& warning : summary["warnings"]) warn(world, warning.get<std::string>());
@@ -395,11 +380,11 @@ void describe_starts(Fields& field, RegistrationStudyOptions& options) {
         options.is_starts_only,
         "Write starts.csv, for other programs, and register nothing")
       .not_recorded("without registrations nothing records options");
-  field(
-      "no_pictures",
-      options.has_no_pictures,
-      "Neither overlays nor settings nor folders for 3D Slicer, some 15 MB and a second per case: "
-      "for batches of many runs");
+  field("no_pictures",
+        options.has_no_pictures,
+        "Neither figures nor overlays nor settings nor folders for 3D Slicer, some 15 MB and a "
+        "second per case: "
+        "for batches of many runs");
   field("only_start",
         options.only_start,
         "Register from this start alone, its start_index in starts.csv, by every renderer: repeats "
@@ -476,10 +461,7 @@ void run_registration(const RegistrationStudyOptions& options,
                       const std::string& command_line,
                       const Communicator& world) {
   const std::filesystem::path& folder = options.output_folder;
-  all_or_none(world, [&] {
-    throw_if_any(problems(options));
-    if (world.is_root()) require_gnuplot();
-  });
+  all_or_none(world, [&] { throw_if_any(problems(options)); });
   RunFolder run({folder,
                  {"starts.csv",
                   "registrations.csv",
@@ -543,13 +525,13 @@ void run_registration(const RegistrationStudyOptions& options,
     }
     write_registrations(folder / "registrations.csv", rows, options.success_tre_mm);
     write_traces(folder, evaluations);
-    draw_figures(options, rows);
     const json summary = summary_json(options, study, evaluations, rows);
     write_text_file(folder / "cases.csv", case_table(summary["renderers"]).to_text());
     write_text_file(folder / "starts-per-interval.csv",
                     drawn_starts_table(summary["cases"], summary["renderers"]).to_text());
     run.finish(summary, provenance);
     print_outcome(summary, folder, world);
+    if (!options.has_no_pictures) draw_results({folder.string()}, world);
   });
 }
 

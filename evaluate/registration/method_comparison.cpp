@@ -5,13 +5,11 @@
 #include <cmath>
 #include <iterator>
 #include <map>
-#include <set>
 #include <utility>
 
 #include <Eigen/Core>
 
 #include "base/error.h"
-#include "base/joined.h"
 #include "evaluate/outputs/sample_summary_json.h"
 #include "evaluate/registration/registration_statistics.h"
 #include "evaluate/starts/perturbed_starts.h"
@@ -172,66 +170,14 @@ MethodRow row_of(const EvaluationRun& run,
   return row;
 }
 
-std::string percent_text(const IntervalSuccess& band) {
-  if (band.trials == 0) return "-";
-  // Whole per cents must not round a failure away.
-  const double percent = 100 * band.rate();
-  const bool would_mislead = percent < 100 && percent >= 99.5;
-  return fixed_text(percent, would_mislead ? 1 : 0);
-}
-
-std::string wilson_text(const IntervalSuccess& band) {
-  if (band.trials == 0) return "";
-  return " [" + fixed_text(100 * band.wilson.low, 0) + ", " +
-         fixed_text(100 * band.wilson.high, 0) + "]";
-}
-
-std::string p_text(double p) {
-  return p < 0.0001 ? "< 0.0001" : fixed_text(p, 4);
-}
-
-std::string number_or_dash(double value, int decimals) {
-  return std::isfinite(value) ? fixed_text(value, decimals) : "-";
-}
-
-/// A table of cells by line (several keys) and column.
-struct CrossTable {
-  std::vector<std::string> key_names;
-  std::map<std::vector<std::string>, std::map<std::string, std::string>> lines;
-  std::set<std::string> columns;
-
-  void set(const std::vector<std::string>& keys, const std::string& column, std::string cell) {
-    columns.insert(column);
-    lines[keys][column] = std::move(cell);
-  }
-
-  [[nodiscard]] std::string markdown() const {
-    std::string text = "|";
-    for (const std::string& name : key_names) text += " " + name + " |";
-    for (const std::string& column : columns) text += " " + column + " |";
-    text += "\n|";
-    for (std::size_t i = 0; i < key_names.size() + columns.size(); ++i) text += "---|";
-    for (const auto& [keys, cells] : lines) {
-      text += "\n|";
-      for (const std::string& key : keys) text += " " + key + " |";
-      for (const std::string& column : columns) {
-        const auto cell = cells.find(column);
-        text += " " + (cell == cells.end() ? std::string() : cell->second) + " |";
-      }
-    }
-    return text + "\n";
-  }
-};
-
 }  // namespace
 
 std::vector<MethodRow> method_rows(const std::vector<EvaluationRun>& runs) {
   std::vector<MethodRow> rows;
   for (const EvaluationRun& run : runs) {
-    if (run.kind != "registration") continue;
     const RunFacts facts = facts_of(run);
     std::map<std::pair<std::string, std::string>, Sums> sums;
-    run.read_in_parts("registrations.csv", [&](const CsvTable& table) {
+    run.read_registrations([&](const CsvTable& table) {
       for (std::size_t i = 0; i < table.row_count(); ++i)
         add_row(table, i, facts, sums[{table.text(i, "case"), table.text(i, "renderer")}]);
     });
@@ -241,7 +187,8 @@ std::vector<MethodRow> method_rows(const std::vector<EvaluationRun>& runs) {
 }
 
 CsvTable methods_table(const std::vector<MethodRow>& rows) {
-  std::vector<std::string> columns = {"run", "case", "method", "renderer", "starts"};
+  std::vector<std::string> columns = {
+      "run", "case", "method", "preset", "similarity", "optimizer", "renderer", "starts"};
   for (std::size_t band = 0; band < kBands; ++band) {
     const std::string name =
         fixed_text(kBandEndsMm[band], 0) + "_" + fixed_text(kBandEndsMm[band + 1], 0) + "_mm";
@@ -263,8 +210,14 @@ CsvTable methods_table(const std::vector<MethodRow>& rows) {
     columns.emplace_back(name);
   CsvTable table(columns);
   for (const MethodRow& row : rows) {
-    std::vector<std::string> fields = {
-        row.run, row.case_name, row.method, row.renderer, std::to_string(row.starts)};
+    std::vector<std::string> fields = {row.run,
+                                       row.case_name,
+                                       row.method,
+                                       row.preset,
+                                       row.similarity,
+                                       row.optimizer,
+                                       row.renderer,
+                                       std::to_string(row.starts)};
     for (std::size_t i = 0; i < row.bands.size(); ++i) {
       const IntervalSuccess& band = row.bands[i];
       fields.push_back(std::to_string(band.trials));
@@ -290,122 +243,69 @@ CsvTable methods_table(const std::vector<MethodRow>& rows) {
   return table;
 }
 
-std::string methods_markdown(const std::vector<MethodRow>& rows) {
-  std::string text = "| Run | Case | Method | Renderer | Success % [95 % interval], starts ";
-  for (std::size_t band = 0; band < kBands; ++band)
-    text += (band == 0 ? "" : " / ") + fixed_text(kBandEndsMm[band], 0) + "-" +
-            fixed_text(kBandEndsMm[band + 1], 0);
-  text +=
-      " mm | of starts | of whose size is rotation | Capture range, mm | Gross failures | TRE of "
-      "successes, mm: mean, median | Right by mRPD: starts, median mm | Bias, deg and mm | DRRs | "
-      "Seconds |\n"
-      "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
-  for (const MethodRow& row : rows) {
-    const std::vector<std::string> cells = {
-        "| " + row.run,
-        row.case_name,
-        row.method,
-        row.renderer,
-        joined(row.bands,
-               " / ",
-               [](const IntervalSuccess& band) { return percent_text(band) + wilson_text(band); }),
-        joined(row.bands,
-               " / ",
-               [](const IntervalSuccess& band) { return std::to_string(band.trials); }),
-        joined(row.rotation_shares, " / ", [](double share) { return number_or_dash(share, 2); }),
-        row.capture_range_mm,
-        std::to_string(row.gross_failures),
-        number_or_dash(row.mean_tre_mm, 3) + ", " + number_or_dash(row.median_tre_mm, 3),
-        std::to_string(row.mrpd_successes) + " of " + std::to_string(row.starts) + ", " +
-            number_or_dash(row.median_mrpd_mm, 3),
-        number_or_dash(row.rotation_bias_deg, 3) + ", " +
-            number_or_dash(row.translation_bias_mm, 3),
-        number_or_dash(row.median_drr_count, 0),
-        number_or_dash(row.median_seconds, 4)};
-    text.append(joined(cells, " | ")).append(" |\n");
-  }
-  return text;
-}
-
-std::string screen_markdown(const std::vector<MethodRow>& rows) {
-  CrossTable table{{"Case", "Renderer", "Preset", "Measure"}, {}, {}};
-  for (const MethodRow& row : rows)
-    table.set({row.case_name, row.renderer, row.preset, row.similarity},
-              row.optimizer,
-              percent_text(row.bands[0]) + " / " + percent_text(row.bands[1]) + ", " +
-                  number_or_dash(row.median_tre_mm, 3));
-  return table.markdown();
-}
-
-std::string studies_markdown(const std::vector<MethodRow>& rows) {
-  CrossTable table{{"Study", "Renderer"}, {}, {}};
-  for (const MethodRow& row : rows) {
-    const std::size_t end = row.run.rfind("-" + row.preset);
-    if (row.preset.empty() || end == std::string::npos) continue;
-    std::string percents;
-    for (const IntervalSuccess& band : row.bands)
-      percents += (percents.empty() ? "" : " / ") + percent_text(band);
-    table.set({row.run.substr(0, end), row.renderer},
-              row.run.substr(end + 1),
-              percents + ", " + number_or_dash(row.median_tre_mm, 3) + ", " +
-                  number_or_dash(1000.0 * row.median_seconds, 1));
-  }
-  return table.columns.size() < 2 ? std::string() : table.markdown();
-}
-
 namespace {
 
-/// "0.021 [0.018, 0.024]" by bootstrap, and Student's interval behind it.
-std::string over_patients_text(const json& over) {
-  const auto number = [&](const char* name) { return number_or_dash(number_of(over[name]), 3); };
-  return number("mean") + " [" + number("low") + ", " + number("high") + "], Student [" +
-         number("student_low") + ", " + number("student_high") + "]";
-}
-
 std::string claim_text(const json& ends) {
-  const json& is_equivalent = ends["is_equivalent"];
+  const json& is_equivalent = ends.at("is_equivalent");
   if (is_equivalent.is_null())
-    return "not claimed: fewer than " + ends["cases_needed"].dump() + " patients";
-  return std::string(is_equivalent.get<bool>() ? "yes" : "not shown") + ", p " +
-         p_text(number_of(ends["p"]));
+    return "not claimed: fewer than " + ends.at("cases_needed").dump() + " patients";
+  return is_equivalent.get<bool>() ? "yes" : "not shown";
 }
 
 }  // namespace
 
-std::string pairs_markdown(const std::vector<EvaluationRun>& runs) {
-  std::string text;
+CsvTable pairs_table(const std::vector<EvaluationRun>& runs) try {
+  CsvTable table({"run",
+                  "common_starts",
+                  "successes_field",
+                  "successes_raycast",
+                  "pairs",
+                  "patients",
+                  "mean_distance_mm",
+                  "bootstrap_low_mm",
+                  "bootstrap_high_mm",
+                  "student_low_mm",
+                  "student_high_mm",
+                  "p95_distance_mm",
+                  "max_distance_mm",
+                  "margin_mm",
+                  "claim",
+                  "p",
+                  "tre_difference_mm",
+                  "mcnemar_p",
+                  "median_seconds_field",
+                  "median_seconds_raycast"});
   for (const EvaluationRun& run : runs) {
     const json pairs = run.summary.value("field_against_raycast", json());
     if (!pairs.is_object() || !pairs.contains("test")) continue;
-    const json& test = pairs["test"];
-    const auto number = [&](const char* name, int decimals) {
-      return number_or_dash(number_of(test[name]), decimals);
-    };
-    // Runs of earlier versions have no distances.
-    const json ends = pairs.value("end_distance_mm", json());
-    text += "| " + run.folder.filename().string() + " | " + pairs["common_starts"].dump() + " | " +
-            pairs["successes"][0].dump() + ", " + pairs["successes"][1].dump() + " | " +
-            number_or_dash(number_of(pairs["mcnemar_p"]), 2) + " | " + pairs["pairs"].dump() +
-            " | ";
-    if (ends.is_object())
-      text += ends["over_cases"]["cases"].dump() + " | " + over_patients_text(ends["over_cases"]) +
-              " | " + number_or_dash(number_of(ends["pairs"]["p95"]), 3) + ", " +
-              number_or_dash(number_of(ends["pairs"]["max"]), 3) + " | " +
-              number_or_dash(number_of(ends["margin_mm"]), 2) + " mm: " + claim_text(ends) + " | ";
-    else
-      text += "- | - | - | - | ";
-    text += number("mean_difference_mm", 3) + " [" + number("low_90_mm", 3) + ", " +
-            number("high_90_mm", 3) + "] | " +
-            number_or_dash(number_of(pairs["median_seconds"][0]), 4) + ", " +
-            number_or_dash(number_of(pairs["median_seconds"][1]), 2) + " |\n";
+    const auto number = [](const json& value) { return number_text(number_of(value)); };
+    const json& ends = pairs.at("end_distance_mm");
+    const json& over = ends.at("over_cases");
+    table.add_row({run.folder.filename().string(),
+                   pairs.at("common_starts").dump(),
+                   pairs.at("successes").at(0).dump(),
+                   pairs.at("successes").at(1).dump(),
+                   pairs.at("pairs").dump(),
+                   over.at("cases").dump(),
+                   number(over.at("mean")),
+                   number(over.at("low")),
+                   number(over.at("high")),
+                   number(over.at("student_low")),
+                   number(over.at("student_high")),
+                   number(ends.at("pairs").at("p95")),
+                   number(ends.at("pairs").at("max")),
+                   number(ends.at("margin_mm")),
+                   claim_text(ends),
+                   number(ends.at("p")),
+                   number(pairs.at("test").at("mean_difference_mm")),
+                   number(pairs.at("mcnemar_p")),
+                   number(pairs.at("median_seconds").at(0)),
+                   number(pairs.at("median_seconds").at(1))});
   }
-  if (text.empty()) return text;
-  return "| Run | Common starts | Successes: field, ray casting | McNemar p | Pairs | Patients | "
-         "End poses apart, mm: mean over patients [95 % intervals] | of pairs: 95th percentile, "
-         "largest | Equivalent within | TRE, field less ray casting, mm [90 % interval, starts as "
-         "if independent] | Seconds |\n"
-         "|---|---|---|---|---|---|---|---|---|---|---|\n" +
-         text;
+  return table;
+} catch (const json::exception&) {
+  throw FileError(
+      "summary.json", "field_against_raycast", "counts and distances", "something else");
 }
 
 }  // namespace af::evaluation

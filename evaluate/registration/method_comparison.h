@@ -49,21 +49,8 @@ std::vector<MethodRow> method_rows(const std::vector<EvaluationRun>& runs);
 /// With Wilson intervals and counts.
 CsvTable methods_table(const std::vector<MethodRow>& rows);
 
-/// The same for people, as a table in Markdown.
-std::string methods_markdown(const std::vector<MethodRow>& rows);
-
-/// Success for the first two bands and median TRE, as a table in Markdown of measures against
-/// optimisers: one line per case, renderer, preset and measure.
-std::string screen_markdown(const std::vector<MethodRow>& rows);
-
-/// The same rows as one line per study and one column per method: success for the three bands (%),
-/// median TRE of successes (mm), median milliseconds. A run's folder is named STUDY-PRESET...;
-/// others are left out. Empty with fewer than two methods.
-std::string studies_markdown(const std::vector<MethodRow>& rows);
-
-/// Field against ray casting from the same starts, of the runs that have both: success, the
-/// distance between the two end poses with intervals over patients and what is claimed of it, and
-/// the paired TRE difference, as a table in Markdown; empty without such a run.
-std::string pairs_markdown(const std::vector<EvaluationRun>& runs);
+/// Field against ray casting from the same starts, a row per run that has both: success, the
+/// distance between the two end poses with intervals over patients, and what is claimed of it.
+CsvTable pairs_table(const std::vector<EvaluationRun>& runs);
 
 }  // namespace af::evaluation

@@ -87,7 +87,7 @@ RigidTransform pose_of(const CsvTable& table,
 std::vector<MethodEnds> ends_of(const EvaluationRun& run) {
   const std::map<std::string, CaseTarget> targets = targets_of(run);
   std::map<std::pair<std::string, std::string>, MethodEnds> methods;
-  run.read_in_parts("registrations.csv", [&](const CsvTable& table) {
+  run.read_registrations([&](const CsvTable& table) {
     for (std::size_t row = 0; row < table.row_count(); ++row) {
       const std::string& name = table.text(row, "case");
       const auto target = targets.find(name);
@@ -133,11 +133,6 @@ Distances distances_of(const MethodEnds& a, const MethodEnds& b) {
   return distances;
 }
 
-std::string percentiles_text(const SampleSummary& summary) {
-  return fixed_text(summary.median, 4) + ", " + fixed_text(summary.percentile_95, 4) + ", " +
-         fixed_text(summary.maximum, 4);
-}
-
 std::string claim_of(const CaseEquivalence& found) {
   if (!found.has_enough_cases()) return "too few patients";
   return found.is_shown() ? "yes" : "not shown";
@@ -148,8 +143,7 @@ std::string claim_of(const CaseEquivalence& found) {
 std::vector<PoseDistanceRow> pose_distances(const std::vector<EvaluationRun>& runs) {
   std::vector<MethodEnds> methods;
   for (const EvaluationRun& run : runs)
-    if (run.kind == "registration")
-      for (MethodEnds& method : ends_of(run)) methods.push_back(std::move(method));
+    for (MethodEnds& method : ends_of(run)) methods.push_back(std::move(method));
   std::vector<PoseDistanceRow> rows;
   for (std::size_t i = 0; i < methods.size(); ++i)
     for (std::size_t k = i + 1; k < methods.size(); ++k) {
@@ -200,18 +194,6 @@ CsvTable pose_distances_table(const std::vector<PoseDistanceRow>& rows) {
                    number_text(row.rotation_deg.percentile_95),
                    number_text(row.rotation_deg.maximum)});
   return table;
-}
-
-std::string pose_distances_markdown(const std::vector<PoseDistanceRow>& rows) {
-  if (rows.empty()) return "";
-  std::string text =
-      "| Case | End poses of | and of | Starts | Distance, mm: median, 95th percentile, maximum "
-      "| Rotation, deg: the same |\n|---|---|---|---|---|---|\n";
-  for (const PoseDistanceRow& row : rows)
-    text += "| " + row.case_name + " | " + row.run_a + " " + row.renderer_a + " | " + row.run_b +
-            " " + row.renderer_b + " | " + std::to_string(row.distance_mm.count) + " | " +
-            percentiles_text(row.distance_mm) + " | " + percentiles_text(row.rotation_deg) + " |\n";
-  return text;
 }
 
 std::vector<PatientDistances> distances_over_patients(const std::vector<PoseDistanceRow>& rows,
@@ -277,27 +259,6 @@ CsvTable patient_distances_table(const std::vector<PatientDistances>& methods) {
                    claim_of(found)});
   }
   return table;
-}
-
-std::string patient_distances_markdown(const std::vector<PatientDistances>& methods) {
-  if (methods.empty()) return "";
-  std::string text =
-      "| End poses of | and of | Patients | Starts | Distance, mm: mean over patients [95 % by "
-      "bootstrap], Student's | Equivalent |\n|---|---|---|---|---|---|\n";
-  for (const PatientDistances& method : methods) {
-    const CaseEquivalence& found = method.equivalence;
-    const auto interval = [](double low, double high) {
-      return std::isnan(low) ? std::string("-")
-                             : "[" + fixed_text(low, 4) + ", " + fixed_text(high, 4) + "]";
-    };
-    text += "| " + method.run_a + " " + method.renderer_a + " | " + method.run_b + " " +
-            method.renderer_b + " | " + std::to_string(found.cases) + " | " +
-            std::to_string(method.starts) + " | " + fixed_text(found.mean, 4) + " " +
-            interval(found.bootstrap.low, found.bootstrap.high) + ", " +
-            interval(found.student.low, found.student.high) + " | within " +
-            number_text(found.margin) + " mm: " + claim_of(found) + " |\n";
-  }
-  return text;
 }
 
 }  // namespace af::evaluation

@@ -30,9 +30,6 @@ std::vector<PoseDistanceRow> pose_distances(const std::vector<EvaluationRun>& ru
 
 CsvTable pose_distances_table(const std::vector<PoseDistanceRow>& rows);
 
-/// The same for people, as a table in Markdown.
-std::string pose_distances_markdown(const std::vector<PoseDistanceRow>& rows);
-
 /// Two methods over all patients that both registered.
 struct PatientDistances {
   std::string run_a, renderer_a;
@@ -47,8 +44,5 @@ std::vector<PatientDistances> distances_over_patients(const std::vector<PoseDist
                                                       double margin_mm);
 
 CsvTable patient_distances_table(const std::vector<PatientDistances>& methods);
-
-/// The same for people, as a table in Markdown; empty without methods.
-std::string patient_distances_markdown(const std::vector<PatientDistances>& methods);
 
 }  // namespace af::evaluation

@@ -153,12 +153,4 @@ void StartsFile::finish() {
   move_into_place(partial_, path_);
 }
 
-std::vector<TreOutcome> outcomes_of(std::span<const RegistrationRow> rows,
-                                    const std::string& renderer) {
-  std::vector<TreOutcome> outcomes;
-  for (const RegistrationRow& row : rows)
-    if (row.renderer == renderer) outcomes.push_back({row.initial_tre_mm, row.tre_mm});
-  return outcomes;
-}
-
 }  // namespace af::evaluation

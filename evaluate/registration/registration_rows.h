@@ -144,8 +144,4 @@ class StartsFile {
   std::ofstream file_;
 };
 
-/// Starts and TREs of one renderer, in row order.
-std::vector<TreOutcome> outcomes_of(std::span<const RegistrationRow> rows,
-                                    const std::string& renderer);
-
 }  // namespace af::evaluation

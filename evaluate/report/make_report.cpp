@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluate/report/make_report.h"
 
-#include <iostream>
-
-#include "evaluate/report/report_page.h"
-#include "figures/gnuplot_figure.h"
+#include "evaluate/report/report_program.h"
 #include "files/output_file.h"
 
 namespace af::evaluation {
@@ -24,11 +21,12 @@ void run_report(const ReportOptions& options,
                 const Communicator& world) {
   all_or_none(world, [&] {
     if (!world.is_root()) return;
-    require_gnuplot();
     announce_output(options.output);
-    const std::vector<EvaluationRun> runs = find_runs(options.runs);
-    write_text_file(options.output, report_page(runs, options.output, options.title));
-    std::cout << "report of " << runs.size() << " run(s): " << options.output.string() << '\n';
+    std::vector<std::string> arguments = {"--output=" + options.output.string()};
+    if (!options.title.empty()) arguments.push_back("--title=" + options.title);
+    arguments.emplace_back("--");
+    for (const std::filesystem::path& run : options.runs) arguments.push_back(run.string());
+    run_af_report(arguments);
   });
 }
 
@@ -41,7 +39,7 @@ cli::SubCommand report_command(CLI::App& app) {
       "One self-contained HTML page of finished runs, side by side when there are several: "
       "findings "
       "in plain words, figures, tables that sort, overlays, failures with their searches and the "
-      "commands that repeat them, provenance; opens offline, prints well",
+      "commands that repeat them, provenance; opens offline, prints well. Starts af-report",
       run_report);
 }
 

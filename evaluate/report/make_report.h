@@ -19,7 +19,7 @@ struct ReportOptions {
   void describe(Fields& field);
 };
 
-/// Collective; rank 0 works. Writes the report of finished runs.
+/// Collective; rank 0 works. Starts af-report on finished runs.
 cli::SubCommand report_command(CLI::App& app);
 
 }  // namespace af::evaluation

@@ -11,11 +11,10 @@
 
 #include "base/error.h"
 #include "evaluate/methods/loaded_methods.h"
-#include "evaluate/outputs/result_figures.h"
 #include "evaluate/outputs/row_gathering.h"
 #include "evaluate/outputs/sample_summary_json.h"
+#include "evaluate/report/report_program.h"
 #include "evaluate/sweeps/similarity_curve.h"
-#include "figures/gnuplot_figure.h"
 #include "files/output_file.h"
 #include "files/sha256.h"
 #include "gold_standard/target_box.h"
@@ -191,22 +190,6 @@ json renderer_json(const std::vector<Curve>& curves,
           {"broadest_translation", broadest_axis(curves, renderer, radius_mm, 3, 5)}};
 }
 
-std::vector<CurvePanel> panels_of(const std::vector<Curve>& curves) {
-  std::vector<CurvePanel> panels(kPoseParameters);
-  // Translations above rotations, as the paper's figure has them.
-  for (const Curve& curve : curves) {
-    CurvePanel& panel = panels[static_cast<std::size_t>((curve.axis + 3) % kPoseParameters)];
-    panel.x_label = std::string(kAxisNames[static_cast<std::size_t>(curve.axis)]) + " (" +
-                    unit_of(curve.axis) + ")";
-    panel.curves.push_back({curve.renderer == "field" ? "field" : "ray casting",
-                            curve.offsets,
-                            curve.similarity,
-                            curve.peak.offset,
-                            curve.peak.similarity});
-  }
-  return panels;
-}
-
 void print_maxima(const std::vector<Curve>& curves, const json& renderers) {
   for (const json& renderer : renderers) {
     const std::string name = renderer["renderer"].get<std::string>();
@@ -265,10 +248,7 @@ void run_similarity_curves(const SimilarityCurvesOptions& options,
                            const std::string& command_line,
                            const Communicator& world) {
   const std::filesystem::path& folder = options.output_folder;
-  all_or_none(world, [&] {
-    throw_if_any(problems(options));
-    if (world.is_root()) require_gnuplot();
-  });
+  all_or_none(world, [&] { throw_if_any(problems(options)); });
   RunFolder run({folder,
                  {"similarity-curves.csv", "maxima.csv", "reproduce.sh", "summary.json"},
                  options.resume.restarts},
@@ -304,10 +284,6 @@ void run_similarity_curves(const SimilarityCurvesOptions& options,
     run.begin_results();
     write_text_file(folder / "similarity-curves.csv", curves_table(curves).to_text());
     write_text_file(folder / "maxima.csv", maxima_table(curves, radius_mm).to_text());
-    draw_curve_panels(panels_of(curves),
-                      "Similarity about the gold pose",
-                      "similarity (" + methods.front().runner.options().final_similarity() + ")",
-                      folder / "similarity-curves");
     json summary = {{"format", "attenuation-fields evaluation"},
                     {"format_version", 1},
                     {"kind", "similarity-curves"},
@@ -321,6 +297,7 @@ void run_similarity_curves(const SimilarityCurvesOptions& options,
       summary["renderers"].push_back(renderer_json(curves, renderer, radius_mm));
     run.finish(summary, provenance);
     print_maxima(curves, summary["renderers"]);
+    draw_results({folder.string()}, world);
     std::cout << "results: " << folder.string() << '\n';
   });
 }

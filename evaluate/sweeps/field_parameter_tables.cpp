@@ -3,10 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <utility>
 
-#include "evaluate/outputs/result_figures.h"
 #include "evaluate/outputs/sample_summary_json.h"
 #include "files/output_file.h"
 #include "text/csv_table.h"
@@ -153,34 +151,6 @@ CsvTable poses_table(const std::vector<SettingResult>& results) {
   return table;
 }
 
-/// A part of the design of a setting.
-auto design_part(int FieldDesign::*part) {
-  return [part](const PrecomputeOptions& setting) { return setting.design().*part; };
-}
-
-/// One panel of the figure: the settings that differ from the base in this parameter alone.
-template <typename ValueOf>
-SweepPanel panel_of(const std::vector<PooledSetting>& pools,
-                    const std::string& label,
-                    ValueOf value_of) {
-  SweepPanel panel{label, true, {}};
-  const PrecomputeOptions& base = pools.front().setting;
-  for (std::size_t i = 0; i < pools.size(); ++i) {
-    const PooledSetting& pool = pools[i];
-    const bool is_base = i == 0;
-    if (!is_base && std::invoke(value_of, pool.setting) == std::invoke(value_of, base)) continue;
-    panel.points.push_back({static_cast<double>(std::invoke(value_of, pool.setting)),
-                            pool.psnr_db.lower_quartile,
-                            pool.psnr_db.median,
-                            pool.psnr_db.upper_quartile,
-                            is_base});
-  }
-  std::sort(panel.points.begin(), panel.points.end(), [](const auto& a, const auto& b) {
-    return a.x < b.x;
-  });
-  return panel;
-}
-
 json pooled_json(const PooledSetting& pool) {
   json files = json::array();
   for (const SettingResult* field : pool.fields) files.push_back(field->setting.output);
@@ -229,13 +199,6 @@ json write_sweep(const std::vector<SettingResult>& results, const std::filesyste
   write_text_file(folder / "field-parameters.csv", settings_table(pools).to_text());
   write_text_file(folder / "field-parameters-fields.csv", fields_table(results).to_text());
   write_text_file(folder / "field-parameters-poses.csv", poses_table(results).to_text());
-  draw_sweep_panels({panel_of(pools, "(u,v) nodes per side", design_part(&FieldDesign::uv_nodes)),
-                     panel_of(pools, "(s,t) nodes per side", design_part(&FieldDesign::st_nodes)),
-                     panel_of(pools, "codewords", design_part(&FieldDesign::codewords)),
-                     panel_of(pools, "share of tiles for training", training_share)},
-                    "DRR quality against the field's parameters",
-                    "PSNR (dB)",
-                    folder / "field-parameters");
   std::string targets;
   for (const std::string& target : targets_of(results))
     targets += (targets.empty() ? "" : ", ") + target;

@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "evaluate/outputs/sample_summary_json.h"
 #include "evaluate/report/evaluation_run.h"
+#include "evaluate/report/report_program.h"
 #include "evaluate/statistics/success_rate.h"
 #include "evaluate/sweeps/error_budget.h"
 #include "files/output_file.h"
@@ -44,7 +45,7 @@ ChainRun read_run(const std::string& step) {
   if (equals == std::string::npos || equals == 0)
     throw InputError("--step", step, "must be LABEL=RUN");
   const std::vector<EvaluationRun> found = find_runs({step.substr(equals + 1)});
-  if (found.size() != 1 || found.front().kind != "registration")
+  if (found.size() != 1)
     throw InputError("--step", step, "must name the folder of one finished registration run");
   const EvaluationRun& files = found.front();
   if (files.summary.at("cases").size() != 1 || files.summary.at("renderers").size() != 1)
@@ -139,32 +140,6 @@ json summary_json(const std::vector<ChainRun>& runs, const ErrorBudget& budget) 
   return summary;
 }
 
-std::string millimetres(const json& value) {
-  return value.is_number() ? fixed_text(value.get<double>(), 3) : "-";
-}
-
-std::string markdown(const json& summary) {
-  std::string text =
-      "| Run | Succeeded | Moves the mean end by, mm | Bias, mm | Scatter, mm | TRE, mm |\n"
-      "|---|---|---|---|---|---|\n";
-  for (const json& step : summary["steps"])
-    text += "| " + step["label"].get<std::string>() + " | " + step["successes"].dump() + " of " +
-            step["starts"].dump() + " | " +
-            (step["shift_mm"].is_number() ? millimetres(step["shift_mm"]) + " +- " +
-                                                millimetres(step["shift_standard_error_mm"])
-                                          : "") +
-            " | " + millimetres(step["bias_mm"]) + " | " + millimetres(step["scatter_mm"]) + " | " +
-            millimetres(step["tre_mm"]) + " |\n";
-  const json& gold = summary["gold"];
-  if (gold.is_object())
-    text += "| gold standard by fiducials, by itself | | " +
-            millimetres(gold["uncertainty"]["mean_tre_mm"]) + " expected, " +
-            millimetres(gold.value("stated_to_fiducials_mm", json())) +
-            " from the stated pose | | | |\n";
-  return text + "\nOver the " + summary["common_starts"].dump() +
-         " starts from which every run succeeded.\n";
-}
-
 }  // namespace
 
 void ErrorBudgetOptions::describe(Fields& field) {
@@ -196,11 +171,10 @@ void run_error_budget(const ErrorBudgetOptions& options,
     const ErrorBudget budget = budget_of(runs);
     const json summary = summary_json(runs, budget);
     const OutputLock lock = make_output_folder(options.output_folder);
-    const std::string text = markdown(summary);
-    write_text_file(options.output_folder / "error-budget.md", text);
     write_text_file(options.output_folder / "error-budget.csv", budget_table(budget).to_text());
     write_results_last(options.output_folder / "summary.json", summary, provenance);
-    std::cout << text << "results: " << options.output_folder.string() << '\n';
+    draw_results({options.output_folder.string()}, world);
+    std::cout << "results: " << options.output_folder.string() << '\n';
   });
 }
 

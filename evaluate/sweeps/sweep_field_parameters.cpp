@@ -15,10 +15,10 @@
 #include "drr/two_pass_af_drr.h"
 #include "evaluate/image_quality/image_quality_tables.h"
 #include "evaluate/outputs/row_gathering.h"
+#include "evaluate/report/report_program.h"
 #include "evaluate/sweeps/difference_images.h"
 #include "evaluate/sweeps/field_parameter_tables.h"
 #include "field_file/field_reading.h"
-#include "figures/gnuplot_figure.h"
 #include "files/output_file.h"
 #include "files/resource_check.h"
 #include "precompute/precompute_field.h"
@@ -323,10 +323,7 @@ void run_field_parameters(const FieldParametersOptions& options,
                           const Communicator& world) {
   const std::filesystem::path fields =
       options.fields_folder.empty() ? options.output_folder / "fields" : options.fields_folder;
-  all_or_none(world, [&] {
-    throw_if_any(problems(options));
-    if (world.is_root()) require_gnuplot();
-  });
+  all_or_none(world, [&] { throw_if_any(problems(options)); });
   RunFolder run({options.output_folder, {"reproduce.sh", "summary.json"}, options.resume.restarts},
                 world);
   run.open();
@@ -348,6 +345,7 @@ void run_field_parameters(const FieldParametersOptions& options,
   all_or_none(world, [&] {
     if (!world.is_root()) return;
     write_results(options, results, difference_images, run, provenance);
+    draw_results({options.output_folder.string()}, world);
   });
 }
 

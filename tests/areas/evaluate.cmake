@@ -19,13 +19,8 @@ af_add_test(
   LIBS af_evaluation)
 
 af_add_test(
-  evaluate_figures_test
-  SOURCES unit/evaluate/outputs/result_figures_test.cpp unit/evaluate/outputs/paper_setting_test.cpp
-  LIBS af_evaluation_outputs af_gnuplot)
-
-af_add_test(
   evaluate_report_test
-  SOURCES unit/evaluate/report/report_text_test.cpp unit/evaluate/registration/evaluation_rows_test.cpp
+  SOURCES unit/evaluate/report/evaluation_run_test.cpp unit/evaluate/registration/evaluation_rows_test.cpp
           unit/evaluate/registration/failure_traces_test.cpp unit/evaluate/report/study_runs_test.cpp
           unit/evaluate/population/population_tables_test.cpp
   LIBS af_evaluation_program af_evaluation_report af_study af_run)

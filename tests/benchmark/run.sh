@@ -63,7 +63,7 @@ if [[ "$skip_build" == no ]]; then
   (cd "$af_root" && cmake --preset release -DAF_BUILD_BENCHMARKS=ON) >"$programs/benchmark-configure.log" 2>&1 ||
     die 1 "configuring failed; see $programs/benchmark-configure.log"
   build_preset release "$af_root/build/benchmark.log" af-precompute af-evaluate af-inspect \
-    bench-machine bench-casting bench-encoding bench-drr-look-up bench-fields bench-ranks bench-report
+    bench-machine bench-casting bench-encoding bench-drr-look-up bench-fields bench-ranks
   # The module may be left out of a build.
   if grep -q '^AF_BUILD_PYTHON:BOOL=ON' "$programs/CMakeCache.txt"; then
     build_preset release "$af_root/build/benchmark.log" bench-python
@@ -128,4 +128,4 @@ for section in "${sections[@]}"; do
   run_section "$section"
   say "        $(duration $((SECONDS - start)))"
 done
-"$bench/bench-report" --folder "$out" --commit "$AF_BENCHMARK_COMMIT" --command "tests/benchmark/run.sh $arguments"
+"$af_root/tests/benchmark/report.py" "$out" "$AF_BENCHMARK_COMMIT" "tests/benchmark/run.sh $arguments"

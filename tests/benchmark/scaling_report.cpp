@@ -8,7 +8,8 @@
 #include "benchmark/benchmark_case.h"
 #include "benchmark/scaling_model.h"
 #include "cli/app_main.h"
-#include "figures/gnuplot_figure.h"
+#include "files/output_file.h"
+#include "text/csv_table.h"
 
 namespace {
 
@@ -22,7 +23,7 @@ constexpr double kMostTrainingTiles = 2e6;
 
 struct ReportOptions {
   std::string benchmark;
-  std::string figure;
+  std::string table;
   double ct_megabytes = 0.0;
   ClusterAssumptions cluster;
 };
@@ -81,40 +82,16 @@ void print_table(const std::string& title, const std::vector<ModelledRun>& runs)
               << 100.0 * parallel_efficiency(runs.front(), run) << " % |\n";
 }
 
-std::vector<std::vector<double>> figure_rows(const std::vector<ModelledRun>& runs) {
-  std::vector<std::vector<double>> rows;
+void add_rows(const std::string& field, const std::vector<ModelledRun>& runs, CsvTable& table) {
   for (const ModelledRun& run : runs)
-    rows.push_back({static_cast<double>(run.ranks),
-                    run.start,
-                    run.cast,
-                    run.train,
-                    run.encode,
-                    run.write,
-                    run.total()});
-  return rows;
-}
-
-void draw(const ReportOptions& options,
-          const std::vector<ModelledRun>& paper,
-          const std::vector<ModelledRun>& large) {
-  GnuplotFigure figure("Modelled seconds of af-precompute", 860, 420);
-  figure.add_data("paper", figure_rows(paper));
-  figure.add_data("large", figure_rows(large));
-  figure.add(
-      "set logscale xy\nset xlabel 'ranks'\nset ylabel 'seconds'\nset grid\n"
-      "set xrange [1:4096]\nset key outside right top\n"
-      "set xtics (1,4,16,64,256,1024,4096)");
-  const auto line = [](const char* data, int column, std::string_view colour, const char* style) {
-    return std::string("$").append(data) + " using 1:" + std::to_string(column) +
-           " with lines lw 2 " + style + " lc rgb '" + std::string(colour) + "' title ";
-  };
-  figure.add("plot " + line("large", 7, palette::kInk, "") + "'128x128 x 1024x1024: total', " +
-             line("large", 3, palette::kBlue, "") + "'casting', " +
-             line("large", 4, palette::kVermilion, "") + "'training', " +
-             line("large", 5, palette::kGreen, "") + "'encoding', " +
-             line("large", 6, palette::kPurple, "") + "'writing', " +
-             line("paper", 7, palette::kQuiet, "dt 2") + "'64x64 x 256x256: total'");
-  figure.draw(options.figure);
+    table.add_row({field,
+                   std::to_string(run.ranks),
+                   number_text(run.start),
+                   number_text(run.cast),
+                   number_text(run.train),
+                   number_text(run.encode),
+                   number_text(run.write),
+                   number_text(run.total())});
 }
 
 void run(const ReportOptions& options) {
@@ -125,7 +102,10 @@ void run(const ReportOptions& options) {
   const auto large = curve_of(scaled(job, kLargeRays, kMostTrainingTiles / tiles), options.cluster);
   print_table("The field measured", paper);
   print_table("128x128 x 1024x1024 (64 times the rays)", large);
-  draw(options, paper, large);
+  CsvTable table({"field", "ranks", "start", "cast", "train", "encode", "write", "total"});
+  add_rows("measured", paper, table);
+  add_rows("large", large, table);
+  write_text_file(options.table, table.to_text());
 }
 
 }  // namespace
@@ -136,7 +116,7 @@ int main(int argc, char** argv) {
   app.add_option(
          "--benchmark", options.benchmark, "benchmark.json with the sections efficiency and ranks")
       ->required();
-  app.add_option("--figure", options.figure, "Path of the figure, without .svg and .png")
+  app.add_option("--table", options.table, "CSV of the curves, of which af-report draws a figure")
       ->required();
   app.add_option("--ct-mb", options.ct_megabytes, "Size of the CT, which every node receives, MB")
       ->required();

@@ -10,7 +10,7 @@ usage() {
 Usage: tests/fuzz/run.sh [--seconds N] [--output FOLDER] [--no-build] [--help] [NAME...]
 
 Runs libFuzzer on our readers: rig, camera, study, scan, csv, pose, found_poses, image, dicom, dicom_xray, dicom_ct, inspect, journal, rows,
-field_values, field_file, shards, report, or those named. Needs clang-14. Corpora grow in FOLDER/NAME/corpus, the log is FOLDER/NAME/log, inputs that are findings are
+field_values, field_file, shards, or those named. Needs clang-14. Corpora grow in FOLDER/NAME/corpus, the log is FOLDER/NAME/log, inputs that are findings are
 FOLDER/NAME/crash-*, oom-* or timeout-*. Exit code 1 when there was a finding.
 
   --seconds N      for each reader (default: 1200)
@@ -32,7 +32,7 @@ while (($# > 0)); do
   esac
   shift
 done
-((${#names[@]} > 0)) || names=(rig camera study scan csv pose found_poses image dicom dicom_xray dicom_ct inspect journal rows field_values field_file shards report)
+((${#names[@]} > 0)) || names=(rig camera study scan csv pose found_poses image dicom dicom_xray dicom_ct inspect journal rows field_values field_file shards)
 
 binaries=$af_root/build/fuzz/tests/fuzz
 if [[ "$build" == yes ]]; then

@@ -37,13 +37,14 @@ depends() {
   done
 }
 
+python_programs=(af-report)
 programs=(af-precompute af-drr af-simulate af-scan af-register af-evaluate af-inspect)
-for program in "${programs[@]}"; do
+for program in "${programs[@]}" "${python_programs[@]}"; do
   holds attenuation-fields "bin/$program" "share/man/man1/$program.1.gz" "share/bash-completion/completions/$program"
 done
 holds attenuation-fields libexec/attenuation-fields/slicer/af-drr libexec/attenuation-fields/slicer/af-register \
   share/doc/attenuation-fields/copyright
-depends attenuation-fields openmpi-bin libc6 libhdf5-openmpi libinsighttoolkit
+depends attenuation-fields python3 python3-jinja2 python3-matplotlib openmpi-bin libc6 libhdf5-openmpi libinsighttoolkit
 library=$(basename "$(ls "$scratch"/packages/libattenuation-fields[0-9]*.deb)" | sed 's/_.*//')
 if [[ -n "$library" ]]; then
   holds libattenuation-fields-dev include/attenuation_fields/attenuation_fields.h include/attenuation_fields/version.h
@@ -55,6 +56,9 @@ fi
 for package in "$scratch"/packages/*.deb; do dpkg-deb --extract "$package" "$scratch/root"; done
 for program in "${programs[@]}"; do
   "$scratch/root/usr/bin/$program" --version >"$scratch/version" || fail "$program does not start"
+done
+for program in "${python_programs[@]}"; do
+  "$scratch/root/usr/bin/$program" --help >"$scratch/version" || fail "$program does not start"
 done
 if compgen -G "$scratch/packages/python3-attenuation-fields_*.deb" >/dev/null; then
   LD_LIBRARY_PATH=$(dirname "$(find "$scratch/root" -name 'libattenuation_fields.so.*' | head -n 1)") \

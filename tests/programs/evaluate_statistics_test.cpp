@@ -105,8 +105,8 @@ class HandBuiltResults : public testing::Test {
     std::filesystem::remove_all(path("out"));
     return test::run_command(std::string(AF_PROGRAM_FOLDER "/af-evaluate registration --study ") +
                              path("study.toml") + " --starts-from " + path("starts.csv") +
-                             " --poses-from " + path("poses.csv") + " --method-name theirs -o " +
-                             path("out") + " " + more);
+                             " --poses-from " + path("poses.csv") +
+                             " --method-name theirs --no-pictures -o " + path("out") + " " + more);
   }
   [[nodiscard]] json summary() const {
     return json::parse(read_text_file(path("out/summary.json")));

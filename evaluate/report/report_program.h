@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// af-report (python/af-report), which makes of results what people read: figures, tables, pages.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "parallel/communicator.h"
+
+namespace af::evaluation {
+
+/// Rank 0. Runs af-report, which stands beside this program or is found in PATH; its standard
+/// output is ours. InputError and FileError with its message when it ends with 3, or cannot be run
+/// or ends otherwise.
+void run_af_report(const std::vector<std::string>& arguments);
+
+/// Rank 0, when all numbers are written. Makes the figures and tables beside them. Where af-report
+/// cannot, because Python or a module of it is missing, a warning names the command for later.
+/// \test EvaluateProgram.ComputesWithoutPythonAndNamesTheCommandForFigures
+void draw_results(const std::vector<std::string>& arguments, const Communicator& world);
+
+}  // namespace af::evaluation

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The command line of af-report."""
+import argparse
+import os
+import sys
+from pathlib import Path
+
+from .help_formats import add_help_formats
+from .problems import ReportError, Unacceptable, Unreadable
+
+MODULES = {"jinja2": "python3-jinja2", "matplotlib": "python3-matplotlib"}
+
+
+def parser():
+    program = argparse.ArgumentParser(
+        prog="af-report", description="Makes what people read of the numbers that af-evaluate writes. With --output one page that opens "
+        "offline, of all finished runs in the folders and below: findings, figures, tables that sort, overlays, failures with their searches "
+        "and the commands that repeat them, provenance. Without it, figures (SVG, PNG and CSV) and tables (Markdown) beside the numbers that "
+        "they are made from; tables are printed, too.", allow_abbrev=False)
+    program.add_argument("paths", metavar="PATH", nargs="+", help="Folders of results; without --output also tables (NAME.csv) of "
+                         "af-evaluate compare and held-out, whose Markdown becomes NAME.md, of jobs/rate-against-truth.sh and bench-scaling")
+    program.add_argument("-o", "--output", metavar="PATH", help="The page to write")
+    program.add_argument("--title", metavar="TEXT", help="The page's title (default: made from the cases' names)")
+    program.add_argument("--screen", action="store_true", help="Of tables of compare: measures against optimisers instead of a row per run")
+    add_help_formats(program)
+    return program
+
+
+def write_page(options):
+    from .files import write_file
+    from .page import page
+    from .runs import find_runs
+    output = Path(options.output)
+    if output.is_dir() or not output.resolve().parent.is_dir():
+        raise Unreadable(f"--output = {output}: must be a file in a folder that exists")
+    runs = find_runs(options.paths)
+    write_file(output, page(runs, output, options.title))
+    print(f"report of {len(runs)} run(s): {output}")
+
+
+def write_table(text, path):
+    from .files import write_file
+    write_file(path, text)
+    print(text, end="", flush=True)
+
+
+def draw_table(path, is_screen):
+    """NAME.md, and figures, of a table that is known by its columns."""
+    from . import studies, tables
+    from .files import columns_of
+    makers = {"rotation_share_0_8_mm": tables.comparison, "smoothed_psnr_db": tables.held_out, "mb_per_camera": studies.rates,
+              "ranks": studies.scaling}
+    columns = columns_of(path)
+    for column, make in makers.items():
+        if column in columns:
+            text = make(path, is_screen)
+            if text:
+                write_table(text, path.with_suffix(".md"))
+            return
+    raise Unacceptable(f"{path}: columns = {', '.join(columns)[:80]}: must be those of a table of af-evaluate compare or held-out, of "
+                       "jobs/rate-against-truth.sh, or of bench-scaling")
+
+
+def draw_folder(folder):
+    """Figures and tables of one folder, as far as its kind has some."""
+    from . import figures, population, tables
+    from .files import columns_of, rows_of
+    from .runs import Run, is_papers_setting, read_summary
+    summary = read_summary(folder / "summary.json") if (folder / "summary.json").is_file() else None
+    if summary is not None:
+        for name, draw in figures.figures_of(Run(folder.resolve(), summary)).items():
+            figures.save(draw(), folder / name)
+        if summary["kind"] == "error-budget":
+            write_table(tables.budget_of(folder / "summary.json"), folder / "error-budget.md")
+    elif (folder / "population.csv").is_file():
+        for name, draw in (("success", population.success), ("capture-range", population.capture_ranges)):
+            drawn = draw(folder)
+            if drawn:
+                figures.save(drawn, folder / name)
+        write_table(tables.population(folder), folder / "population.md")
+    elif (folder / "image-quality.csv").is_file() and "camera" in columns_of(folder / "image-quality.csv"):
+        groups = figures.psnr_of_rows(rows_of(folder / "image-quality.csv"), "")
+        parts = [read_summary(path) for path in sorted(folder.glob("*/summary.json"))]
+        are_papers = bool(parts) and all(part is not None and is_papers_setting(Run(folder, part)) for part in parts)
+        figures.save(figures.psnr_boxes(groups, are_papers), folder / "psnr")
+    else:
+        raise Unacceptable(f"PATH = {folder}: holds no results of af-evaluate")
+
+
+def run(options):
+    if options.output:
+        write_page(options)
+        return
+    for path in map(Path, options.paths):
+        if path.is_dir():
+            draw_folder(path)
+        elif path.is_file():
+            draw_table(path, options.screen)
+        else:
+            raise Unreadable(f"{path}: does not exist")
+
+
+def main():
+    options = parser().parse_args()
+    if (options.title or options.screen) and bool(options.title) != bool(options.output):
+        parser().error("--title needs --output, and --screen must not be given with it")
+    try:
+        run(options)
+        sys.stdout.flush()
+        return 0
+    except ReportError as error:
+        problem, code = str(error), error.code
+    except ModuleNotFoundError as error:
+        if error.name not in MODULES:
+            raise
+        problem, code = f"the Python module {error.name} is missing; on Debian: apt-get install {' '.join(MODULES.values())}", 4
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError) as error:
+        problem, code = f"{', '.join(options.paths)}: a summary.json or a table lacks something: {error!r}", 4
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 4
+    except KeyboardInterrupt:
+        return 130
+    except OSError as error:
+        problem, code = str(error), 4
+    sys.stdout.flush()
+    print(f"af-report: {problem}", file=sys.stderr)
+    return code
