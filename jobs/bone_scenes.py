@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """X-rays of one bone among others and a study of it, for what is measured of `--preset bone` (docs/howto/bones.md): the CT holds one
 bone in air (numbers 0 to 4095), two cameras (MayaCam files) also see other bones and soft tissue. X-rays are cast through bodies of
-half the CT's voxels, so that they share none. Needs numpy and af-drr."""
+half the CT's voxels, so that they share none. Needs numpy, af-drr and af-convert beside it."""
 import argparse
 import pathlib
 import struct
@@ -188,7 +188,7 @@ def pose_beside(random):
 
 
 def study_text(case, gold, landmarks_px):
-    text = f'rig = "{",".join(camera + ".txt" for camera in CAMERAS)}"\n[[case]]\nname = "{case}"\nct = "bone.nii"\nct_values = "raw"\n'
+    text = f'rig = "rig.toml"\n[[case]]\nname = "{case}"\nct = "bone.nii"\nct_values = "raw"\n'
     text += f"ct_raw_slope_per_mm = {RAW_SLOPE_PER_MM}\ncenter_ct_mm = {CENTER_CT.tolist()}\n"
     text += f"target_box_ct_mm = {TARGET_BOX_CT}\nlandmarks_ct_mm = {LANDMARKS_CT.tolist()}\n"
     text += f"gold_room_from_ct = {gold.tolist()}\n"
@@ -204,6 +204,9 @@ def write_scene(folder, case, seed, af_drr):
     down = np.array([0.0, 1.0, 0.0])
     beams = [np.array([0.6, 0.0, 0.8]), np.array([-0.95, 0.0, 0.3122])]
     matrices = [write_mayacam(folder / f"{camera}.txt", beam / np.linalg.norm(beam), down) for camera, beam in zip(CAMERAS, beams)]
+    rig = folder / "rig.toml"
+    subprocess.run([pathlib.Path(af_drr).with_name("af-convert"), *(folder / f"{camera}.txt" for camera in CAMERAS), "-o", rig],
+                   check=True, stderr=subprocess.DEVNULL)
     grid = Grid(FINE_MM)
     body, gold = bone(grid, seed), pose_of(turned(random, 25, 60), random.uniform(-8, 8, 3))
     write_nifti(folder / "bone.nii", halved(body), 2 * FINE_MM)
@@ -215,10 +218,9 @@ def write_scene(folder, case, seed, af_drr):
         scratch = pathlib.Path(name)
         for values, pose in seen:
             write_nifti(scratch / "body.nii", values, FINE_MM)
-            np.savetxt(scratch / "pose.txt", pose)
+            (scratch / "pose.toml").write_text(f"room_from_ct = {pose.tolist()}\n")
             for camera, image in zip(CAMERAS, attenuation):
-                rig = ",".join(str(folder / f"{c}.txt") for c in CAMERAS)
-                subprocess.run([af_drr, "--ct", scratch / "body.nii", *RAW, "--rig", rig, "--camera", camera, "--pose", scratch / "pose.txt",
+                subprocess.run([af_drr, "--ct", scratch / "body.nii", *RAW, "--rig", rig, "--camera", camera, "--pose", scratch / "pose.toml",
                                 "-o", scratch / "drr.mha"], check=True, stdout=subprocess.DEVNULL)
                 image += mha_values(scratch / "drr.mha")
     noise = random.uniform(1, 5)

@@ -13,7 +13,8 @@ base_packages=(
   libeigen3-dev libcli11-dev libtomlplusplus-dev nlohmann-json3-dev libnlopt-dev libspdlog-dev libssl-dev libboost-math-dev
   libgtest-dev libgmock-dev
   python3-dev python3-numpy pybind11-dev python3-wheel
-  libcairo2-dev libexpat1-dev fonts-dejavu-core python3-jinja2 python3-matplotlib
+  libcairo2-dev fonts-dejavu-core
+  python3-h5py python3-jinja2 python3-matplotlib python3-pydicom python3-yaml
   dpkg-dev file
   invesalius-examples
 )

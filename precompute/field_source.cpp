@@ -9,10 +9,10 @@
 #include "pose_files/pose_file.h"
 #include "study/ct_keys.h"
 #include "study/node_ct.h"
-#include "study/pose_context.h"
 #include "study/rig_file.h"
 #include "study/shared_inputs.h"
 #include "study/target_place.h"
+#include "text/shell_words.h"
 
 namespace af {
 
@@ -73,10 +73,8 @@ NamedSource source_of_options(const PrecomputeOptions& options,
   if (!options.nominal_pose.empty())
     source.nominal_room_from_ct =
         shared_poses(communicator, [&] {
-          return std::vector{
-              read_pose(options.nominal_pose,
-                        pose_context(options.ct, options.ct_reading, source.rig, std::nullopt),
-                        &warnings)};
+          return std::vector{read_pose(
+              options.nominal_pose, {std::nullopt, "--ct " + shell_quoted(options.ct)}, &warnings)};
         }).front();
   return source;
 }
@@ -151,9 +149,8 @@ FieldSource load_source(const PrecomputeOptions& options, const Communicator& co
   source.range = all_or_none(communicator, [&] { return options.range(); });
   if (!options.cover.empty()) {
     const std::vector<RigidTransform> poses = shared_poses(communicator, [&] {
-      return read_poses(options.cover,
-                        pose_context(named.ct_path, named.ct_reading, named.rig, source.frame),
-                        &source.warnings);
+      return read_poses(
+          options.cover, {source.frame, "--ct " + shell_quoted(named.ct_path)}, &source.warnings);
     });
     source.range = range_about(poses, source.frame, source.range);
     all_or_none(communicator, [&] { throw_if_any(problems(source.range)); });

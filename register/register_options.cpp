@@ -22,7 +22,7 @@ void describe_start(Fields& field, RegisterOptions& options) {
       .choice({"auto", "nominal", "landmarks"});
   field("start_pose",
         options.start_pose,
-        "Start: file with one pose of any format that docs/poses.md lists")
+        "Start: file with one pose as TOML, JSON, CSV or ITK text (docs/poses.md)")
       .stands_for(PathRole::InputTransform, ".tfm");
   field("starts",
         options.starts,

@@ -25,9 +25,9 @@
 #include "run/terminal.h"
 #include "study/case_gold_standard.h"
 #include "study/landmark_start.h"
-#include "study/pose_context.h"
 #include "study/shared_inputs.h"
 #include "text/csv_table.h"
+#include "text/foreign_file.h"
 #include "text/options_toml.h"
 
 namespace af::registration {
@@ -99,7 +99,8 @@ CaseToRegister read_case(const RegisterOptions& options, const Communicator& wor
   std::vector<std::string> notes;
   found.starts = shared_poses(world, [&] {
     if (found.landmarks.has_value()) return std::vector{found.landmarks->room_from_ct};
-    return start_poses(options, pose_context(found.study, found.of, options.ct), notes);
+    return start_poses(
+        options, {found.of.frame(), conversion_options(options.study, found.of.name)}, notes);
   });
   warn_of(notes, world);
   found.gold = all_or_none(world, [&] { return known_gold(found.study, found.of); });

@@ -1,180 +1,110 @@
 // SPDX-License-Identifier: Apache-2.0
-// Projection matrices as text: pixels from room mm, (column, row, 1) ~ P (x, 1), three lines of
-// four numbers per camera or twelve numbers on one line. Comments begin with '#'; those that this
-// project writes state what a matrix leaves open:
-//     # camera AP
-//     # size_px 256 256
-//     # pixel_spacing_mm 1.190625 1.190625
-//     # isocenter_point 0 0 0
-#include <algorithm>
-#include <cmath>
+#include "camera_files/matrix_text.h"
 
-#include "base/error.h"
-#include "base/named_rows.h"
-#include "camera_files/camera_text.h"
-#include "camera_files/format_readers.h"
-#include "geometry/pinhole_camera.h"
+#include <algorithm>
+#include <map>
+#include <vector>
+
+#include "base/parsed_number.h"
+#include "base/toml_text.h"
+#include "text/toml_reader.h"
 
 namespace af {
 
 namespace {
 
-constexpr std::size_t kMatrixRows = 3;
-constexpr std::size_t kMatrixColumns = 4;
-constexpr std::size_t kMatrixNumbers = kMatrixRows * kMatrixColumns;
-constexpr std::size_t kMostMatrices = 10000;
+constexpr std::size_t kColumns = 4;
+constexpr std::size_t kNumbers = 12;
 
-bool is_comment(const WordLine& line) {
-  return line.text.front() == '#';
+/// Words of a line between blanks, commas, semicolons and brackets.
+std::vector<std::string> words_of(std::string_view line) {
+  constexpr std::string_view kSeparators = " \t\r,;[]";
+  std::vector<std::string> words;
+  for (std::size_t at = 0;;) {
+    at = line.find_first_not_of(kSeparators, at);
+    if (at == std::string_view::npos) return words;
+    const std::size_t end = std::min(line.find_first_of(kSeparators, at), line.size());
+    words.emplace_back(line.substr(at, end - at));
+    at = end;
+  }
 }
 
-bool holds_matrix_row(const WordLine& line) {
-  return (line.words.size() == kMatrixColumns || line.words.size() == kMatrixNumbers) &&
-         std::ranges::all_of(line.words, is_number);
+std::vector<std::vector<std::string>> lines_of_words(std::string_view text) {
+  std::vector<std::vector<std::string>> lines;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.find('\n', at), text.size());
+    if (auto words = words_of(text.substr(at, end - at)); !words.empty())
+      lines.push_back(std::move(words));
+    at = end + 1;
+  }
+  return lines;
 }
 
-/// Gathers a camera from its comments and its rows.
-class MatrixReader {
- public:
-  explicit MatrixReader(const CameraFile& file) : file_(file) {}
+bool is_comment(const std::vector<std::string>& words) {
+  return words.front().starts_with('#');
+}
 
-  StatedRig run() {
-    for (const WordLine& line : word_lines(file_.text)) {
-      if (is_comment(line))
-        take_comment(line);
-      else if (line.words.size() == kMatrixNumbers && row_count_ == 0)
-        take_matrix(numbers_of(line, kMatrixNumbers, file_.name()));
-      else
-        take_row(line);
-    }
-    if (row_count_ != 0 || stated_.cameras.empty())
-      throw FileError(file_.name(), "truncated: a projection matrix has 3 rows of 4 numbers");
-    return stated_;
+/// "[a, b]" of words from `first` on; empty when one is no number.
+std::string list_of(const std::vector<std::string>& words, std::size_t first, std::size_t count) {
+  std::string list;
+  for (std::size_t i = first; i < first + count; ++i) {
+    const auto number = i < words.size() ? parsed_number(words[i]) : std::nullopt;
+    if (!number) return "";
+    list += (list.empty() ? "[" : ", ") + toml_number(*number);
   }
+  return list + "]";
+}
 
- private:
-  /// "# key numbers" of those keys that matter here; all other comments are left alone.
-  void take_comment(const WordLine& line) {
-    std::vector<std::string_view> words = line.words;
-    if (words.front() == "#") words.erase(words.begin());
-    if (words.size() < 2) return;
-    const auto numbers = [&](Eigen::Index count) {
-      WordLine rest = line;
-      rest.words.assign(words.begin() + 1, words.end());
-      return numbers_of(rest, count, file_.name());
-    };
-    if (words.front() == "camera") {
-      next_.has_name = true;
-      const std::size_t at = line.text.find("camera") + std::string_view("camera").size();
-      next_.geometry.name = std::string(trimmed_view(line.text.substr(at)));
-    } else if (words.front() == "size_px") {
-      next_.geometry.size_px = size_of(numbers(2), place_of(line, file_.name()) + ": size_px");
-      next_.has_size = true;
-    } else if (words.front() == "pixel_spacing_mm") {
-      next_.geometry.pixel_spacing_mm = numbers(2);
-      if (!(next_.geometry.pixel_spacing_mm.minCoeff() > 0.0))
-        throw InputError(place_of(line, file_.name()) + ": pixel_spacing_mm",
-                         std::string(line.text),
-                         "must be positive");
-      next_.has_spacing = true;
-    } else if (words.front() == "isocenter_point") {
-      stated_.isocenter_point = numbers(3);
-    }
-  }
-
-  void take_row(const WordLine& line) {
-    rows_.row(static_cast<Eigen::Index>(row_count_++)) =
-        numbers_of(line, kMatrixColumns, file_.name()).transpose();
-    if (row_count_ == kMatrixRows) take_matrix(rows_.transpose().reshaped());
-  }
-
-  void take_matrix(const Eigen::VectorXd& numbers) {
-    row_count_ = 0;
-    if (stated_.cameras.size() == kMostMatrices)
-      throw InputError(file_.name(), "more than 10000 matrices", "are too many cameras");
-    Eigen::Matrix<double, 3, 4> matrix;
-    for (Eigen::Index row = 0; row < matrix.rows(); ++row)
-      matrix.row(row) = numbers.segment<kMatrixColumns>(row * matrix.cols()).transpose();
-    CameraGeometry& camera = next_.geometry;
-    camera = from_matrix(matrix, camera);
-    stated_.cameras.push_back(next_);
-    next_ = empty_;
-  }
-
-  /// The side on which the object is becomes known with the isocentre only.
-  [[nodiscard]] CameraGeometry from_matrix(const Eigen::Matrix<double, 3, 4>& matrix,
-                                           const CameraGeometry& stated) const {
-    const std::string name = stated.name.empty() ? file_.name() + ", matrix " +
-                                                       std::to_string(stated_.cameras.size() + 1)
-                                                 : stated.name;
-    // A point with positive w, wherever it is.
-    const Eigen::Vector3d axis = matrix.row(2).head<3>();
-    const double norm = axis.squaredNorm();
-    const Eigen::Vector3d front =
-        norm > 0.0 ? Eigen::Vector3d((1.0 - matrix(2, 3)) / norm * axis) : Eigen::Vector3d::Zero();
-    Eigen::Vector2d spacing_mm = stated.pixel_spacing_mm;
-    if (!next_.has_spacing) spacing_mm.y() = spacing_mm.x() * focal_ratio(matrix);
-    CameraGeometry camera =
-        CameraGeometry::from_projection_matrix(name, matrix, spacing_mm, stated.size_px, front);
-    camera.name = stated.name;
-    return camera;
-  }
-
-  /// Focal length of columns by that of rows, in pixels.
-  static double focal_ratio(const Eigen::Matrix<double, 3, 4>& matrix) {
-    const Eigen::Vector3d depth = matrix.row(2).head<3>().normalized();
-    const auto focal = [&](Eigen::Index row) {
-      const Eigen::Vector3d axis = matrix.row(row).head<3>();
-      return (axis - axis.dot(depth) * depth).norm();
-    };
-    const double ratio = focal(0) / focal(1);
-    return ratio > 0.0 && std::isfinite(ratio) ? ratio : 1.0;
-  }
-
-  static StatedCamera nothing_stated() {
-    StatedCamera camera;
-    camera.geometry.size_px = {1, 1};
-    camera.has_size = false;
-    camera.has_spacing = false;
-    camera.knows_front = false;
-    return camera;
-  }
-
-  const CameraFile& file_;
-  const StatedCamera empty_ = nothing_stated();
-  StatedCamera next_ = empty_;
-  StatedRig stated_;
-  Eigen::Matrix<double, 3, 4> rows_;
-  std::size_t row_count_ = 0;
-};
+/// Sizes are whole numbers.
+std::string size_of(const std::vector<std::string>& words) {
+  const bool is_size = words.size() == 4 &&
+                       words[2].find_first_not_of("0123456789") == std::string::npos &&
+                       words[3].find_first_not_of("0123456789") == std::string::npos;
+  return is_size ? "[" + words[2] + ", " + words[3] + "]" : "";
+}
 
 }  // namespace
 
-bool is_matrix_text(const CameraFile& file) {
+bool is_matrix_text(std::string_view text) {
   std::size_t rows = 0;
-  for (const WordLine& line : word_lines(file.text)) {
-    if (is_comment(line)) continue;
-    if (!holds_matrix_row(line)) return false;
-    rows += line.words.size() == kMatrixColumns ? 1 : kMatrixRows;
+  for (const std::vector<std::string>& words : lines_of_words(text)) {
+    if (is_comment(words)) continue;
+    if ((words.size() != kColumns && words.size() != kNumbers) ||
+        !std::ranges::all_of(words,
+                             [](const auto& word) { return parsed_number(word).has_value(); }))
+      return false;
+    rows += words.size() / kColumns;
   }
-  // Four rows are a pose.
-  return rows > 0 && rows % kMatrixRows == 0;
+  return rows > 0 && rows % 3 == 0;
 }
 
-StatedRig read_matrix_text(const CameraFile& file, const CameraFileOptions& /*options*/) {
-  return MatrixReader(file).run();
-}
-
-std::string write_matrix_text(const CameraRig& rig) {
-  std::string text =
-      "# Projection matrices: pixels (column, row; integers are centres) from room mm.\n";
-  text += "# isocenter_point " + numbers_text(rig.isocenter_point.transpose(), " ") + "\n";
-  for (const CameraGeometry& camera : rig.cameras)
-    text += "# camera " + camera.name + "\n# size_px " +
-            numbers_text(camera.size_px.cast<double>().transpose(), " ") + "\n# pixel_spacing_mm " +
-            numbers_text(camera.pixel_spacing_mm.transpose(), " ") + "\n" +
-            rows_text(projection_matrix_of(camera), " ");
-  return text;
+std::string rig_toml_of_matrices(std::string_view text) {
+  std::string isocenter;
+  std::string cameras;
+  std::map<std::string, std::string> stated;
+  std::string rows;
+  std::size_t row_count = 0;
+  for (const std::vector<std::string>& words : lines_of_words(text)) {
+    if (is_comment(words)) {
+      if (words.size() < 3) continue;
+      if (words[1] == "isocenter_point") isocenter = list_of(words, 2, 3);
+      if (words[1] == "camera") stated["name"] = toml_text(words[2]);
+      if (words[1] == "size_px") stated["size_px"] = size_of(words);
+      if (words[1] == "pixel_spacing_mm") stated["pixel_spacing_mm"] = list_of(words, 2, 2);
+      continue;
+    }
+    for (std::size_t at = 0; at < words.size(); at += kColumns, ++row_count)
+      rows += (rows.empty() ? "" : ", ") + list_of(words, at, kColumns);
+    if (row_count % 3 != 0) continue;
+    cameras += "[[camera]]\nprojection_matrix = [" + rows + "]\n";
+    for (const char* key : {"name", "size_px", "pixel_spacing_mm"}) {
+      if (stated[key].empty()) return "";
+      cameras += std::string(key) + " = " + stated[key] + "\n";
+    }
+    stated.clear();
+    rows.clear();
+  }
+  return isocenter.empty() ? "" : "isocenter_point = " + isocenter + "\n" + cameras;
 }
 
 }  // namespace af

@@ -12,7 +12,6 @@
 #include "base/file_name.h"
 #include "base/joined.h"
 #include "base/toml_text.h"
-#include "camera_files/format_readers.h"
 #include "text/toml_reader.h"
 
 namespace af {
@@ -300,23 +299,6 @@ std::string rig_to_toml(const CameraRig& rig) {
               "\n";
   }
   return text;
-}
-
-bool is_rig_toml(const CameraFile& file) {
-  const auto lines = word_lines(file.text);
-  return std::any_of(lines.begin(), lines.end(), [](const WordLine& line) {
-    return line.text.starts_with("[[camera]]");
-  });
-}
-
-StatedRig read_rig_toml(const CameraFile& file, const CameraFileOptions& /*options*/) {
-  const CameraRig rig = parse_rig(file.text, file.name());
-  StatedRig stated;
-  stated.isocenter_point = rig.isocenter_point;
-  for (const CameraGeometry& camera : rig.cameras) {
-    stated.cameras.push_back({.geometry = camera, .has_name = true});
-  }
-  return stated;
 }
 
 }  // namespace af

@@ -41,6 +41,7 @@ function(af_add_python_program program modules)
           PATTERN "__pycache__" EXCLUDE)
   af_install_helps(${program} ${PROJECT_SOURCE_DIR}/python/${program})
 endfunction()
+af_add_python_program(af-convert af_convert)
 af_add_python_program(af-report af_report)
 
 # A folder for Slicer, which starts every program of the folders that it searches for modules.

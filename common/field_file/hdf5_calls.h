@@ -12,7 +12,7 @@
 
 #include "base/error.h"
 #include "field_file/dataset_rule.h"
-#include "hdf5_files/hdf5_handles.h"
+#include "field_file/hdf5_handles.h"
 
 #ifndef H5_HAVE_PARALLEL
 #error "the field file needs parallel HDF5: link hdf5-openmpi (see common/cmake/ThirdParty.cmake)"

@@ -14,7 +14,7 @@
 
 #include "field_file/dataset_rule.h"
 #include "field_file/index_chunks.h"
-#include "hdf5_files/hdf5_handles.h"
+#include "field_file/hdf5_handles.h"
 
 namespace af::hdf5 {
 

@@ -11,6 +11,7 @@
 #include "base/named_rows.h"
 #include "base/number_text.h"
 #include "base/toml_text.h"
+#include "pose_files/pose_file.h"
 
 namespace af {
 namespace {
@@ -18,6 +19,13 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using RowMajorMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+
+/// x' = A (x - c) + c + t, c the fixed parameters (itk::MatrixOffsetTransformBase).
+struct ItkTransform {
+  std::string type;  ///< "Euler3DTransform_double_3_3"
+  std::vector<double> parameters;
+  std::vector<double> fixed_parameters;
+};
 
 Matrix3d rotation_about(const Vector3d& axis, double angle_rad) {
   return Eigen::AngleAxisd(angle_rad, axis).toRotationMatrix();
@@ -108,14 +116,8 @@ std::map<std::string, std::string> itk_fields(const std::string& text, const std
   return fields;
 }
 
-std::string numbers_text(const std::vector<double>& numbers) {
-  std::string text;
-  for (const double number : numbers) text += " " + number_text(number);
-  return text;
-}
-
-}  // namespace
-
+/// The map of the points that the transform maps, as rigid transform. InputError for other types
+/// and for ones that are not rigid; FileError for wrong numbers of parameters.
 RigidTransform map_of_itk_transform(const ItkTransform& transform, const std::string& file) {
   const std::string name = transform.type.substr(0, transform.type.find('_'));
   const ItkType* const type = find_row(kItkTypes, name);
@@ -150,14 +152,7 @@ RigidTransform map_of_itk_transform(const ItkTransform& transform, const std::st
   return rigid_or_throw(map, file);
 }
 
-ItkTransform itk_transform_of_map(const RigidTransform& map) {
-  ItkTransform transform{"AffineTransform_double_3_3", {}, {0.0, 0.0, 0.0}};
-  for (int row = 0; row < 3; ++row)
-    for (int column = 0; column < 3; ++column)
-      transform.parameters.push_back(map.linear()(row, column));
-  for (int row = 0; row < 3; ++row) transform.parameters.push_back(map.translation()[row]);
-  return transform;
-}
+}  // namespace
 
 bool is_itk_text(const PoseFileBytes& file) {
   const std::size_t start = file.bytes.find_first_not_of(" \t\r\n");
@@ -174,12 +169,17 @@ PosesInFile read_itk_text(const PoseFileBytes& file, const PoseContext& /*contex
   return {{{1, map_of_itk_transform(transform, name).inverse()}}, {}};
 }
 
-std::string write_itk_text(std::span<const RigidTransform> room_from_ct,
-                           const PoseContext& /*context*/) {
-  const ItkTransform transform = itk_transform_of_map(only_pose(room_from_ct, "itk").inverse());
-  return "#Insight Transform File V1.0\n#Transform 0\nTransform: " + transform.type +
-         "\nParameters:" + numbers_text(transform.parameters) +
-         "\nFixedParameters:" + numbers_text(transform.fixed_parameters) + "\n";
+std::string pose_to_itk_transform(const RigidTransform& room_from_ct) {
+  const RigidTransform ct_from_room = room_from_ct.inverse();
+  std::string parameters;
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 3; ++column)
+      parameters += " " + number_text(ct_from_room.linear()(row, column));
+  for (int row = 0; row < 3; ++row)
+    parameters += " " + number_text(ct_from_room.translation()[row]);
+  return "#Insight Transform File V1.0\n#Transform 0\nTransform: AffineTransform_double_3_3\n"
+         "Parameters:" +
+         parameters + "\nFixedParameters: 0 0 0\n";
 }
 
 }  // namespace af

@@ -6,57 +6,21 @@
 #include <sstream>
 
 #include "base/error.h"
-#include "base/named_rows.h"
 #include "base/parsed_number.h"
 #include "base/toml_text.h"
 #include "files/output_file.h"
-#include "pose_files/autoscoper_pose.h"
-#include "pose_files/dicom_registration.h"
-#include "pose_files/diffdrr_pose.h"
 #include "pose_files/itk_transform.h"
 #include "pose_files/project_poses.h"
+#include "text/foreign_file.h"
 
 namespace af {
 namespace {
 
 constexpr std::array kPoseFormats = {
-    PoseFormat{"itk-hdf5",
-               "ITK transform in HDF5 (xReg): ct_from_room, LPS, mm",
-               is_hdf5,
-               read_itk_hdf5,
-               write_itk_hdf5},
-    PoseFormat{"dicom",
-               "DICOM spatial registration: room_from_ct, LPS, mm",
-               is_dicom_registration,
-               read_dicom_registration,
-               write_dicom_registration},
-    PoseFormat{"itk",
-               "ITK transform as text (.tfm, Slicer, elastix): ct_from_room, LPS, mm",
-               is_itk_text,
-               read_itk_text,
-               write_itk_text},
-    PoseFormat{"json", "result.json: room_from_ct", is_json_pose, read_json_pose, nullptr},
-    PoseFormat{"diffdrr",
-               "DiffDRR's rotation and translation of one camera, RAS about the CT's middle",
-               is_diffdrr,
-               read_diffdrr,
-               write_diffdrr},
-    PoseFormat{"toml", "TOML: room_from_ct, 4x4", is_toml_pose, read_toml_pose, write_toml_pose},
-    PoseFormat{"csv",
-               "table of poses: m00 ... m23 of room_from_ct, or rx_deg ... tz_mm from nominal",
-               is_csv_of_poses,
-               read_csv_of_poses,
-               write_csv_of_poses},
-    PoseFormat{"autoscoper",
-               "Autoscoper .tra: a line of 16 numbers per frame, room from the CT's voxel frame",
-               is_autoscoper,
-               read_autoscoper,
-               write_autoscoper},
-    PoseFormat{"matrix",
-               "plain text: the 16 numbers of room_from_ct, row by row",
-               is_plain_pose,
-               read_plain_pose,
-               write_plain_pose},
+    PoseFormat{"itk", is_itk_text, read_itk_text},
+    PoseFormat{"json", is_json_pose, read_json_pose},
+    PoseFormat{"toml", is_toml_pose, read_toml_pose},
+    PoseFormat{"csv", is_csv_of_poses, read_csv_of_poses},
 };
 
 /// With at least one pose; its notes are passed on.
@@ -104,30 +68,14 @@ std::vector<std::string> lines_of(const std::string& text) {
   return lines;
 }
 
-const RigidTransform& only_pose(std::span<const RigidTransform> poses, const char* format) {
-  if (poses.size() != 1)
-    throw InputError("number of poses",
-                     std::to_string(poses.size()),
-                     std::string("must be 1 for the format ") + format);
-  return poses.front();
-}
-
-std::span<const PoseFormat> pose_formats() {
-  return kPoseFormats;
-}
-
-std::vector<std::string> written_pose_formats() {
-  std::vector<std::string> names;
-  for (const PoseFormat& format : kPoseFormats)
-    if (format.write != nullptr) names.emplace_back(format.name);
-  return names;
-}
-
-const PoseFormat& format_of_pose_file(const PoseFileBytes& file) {
-  for (const PoseFormat& format : kPoseFormats)
-    if (format.is_it(file)) return format;
-  throw FileError(file.path.string(),
-                  "holds no pose of a known format (" + joined(names_of(kPoseFormats)) + ")");
+const PoseFormat& format_of_pose_file(const PoseFileBytes& file, const PoseContext& context) {
+  if (!has_foreign_mark(file.bytes))
+    for (const PoseFormat& format : kPoseFormats)
+      if (format.is_it(file)) return format;
+  throw needs_conversion({&file.path, 1},
+                         "holds no pose as TOML, CSV, JSON or ITK's text",
+                         context.conversion_options,
+                         "poses.csv");
 }
 
 PoseFileBytes read_pose_bytes(const std::filesystem::path& path) {
@@ -140,7 +88,7 @@ PoseFileBytes read_pose_bytes(const std::filesystem::path& path) {
 
 PosesInFile read_pose_file(const std::filesystem::path& path, const PoseContext& context) {
   const PoseFileBytes file = read_pose_bytes(path);
-  return format_of_pose_file(file).read(file, context);
+  return format_of_pose_file(file, context).read(file, context);
 }
 
 std::vector<RigidTransform> read_poses(const std::filesystem::path& path,
@@ -172,20 +120,6 @@ RigidTransform read_pose(const std::filesystem::path& path,
     throw InputError(path.string() + ": holds " + std::to_string(poses.size()) +
                      " poses; one is expected");
   return poses.front();
-}
-
-std::string pose_file_bytes(const std::string& format,
-                            std::span<const RigidTransform> room_from_ct,
-                            const PoseContext& context) {
-  const PoseFormat& row = required_row(kPoseFormats, "format of poses", format);
-  if (row.write == nullptr)
-    throw InputError(
-        "format of poses", format, "is only read; written are " + joined(written_pose_formats()));
-  return row.write(room_from_ct, context);
-}
-
-std::string pose_to_itk_transform(const RigidTransform& room_from_ct) {
-  return write_itk_text({&room_from_ct, 1}, {});
 }
 
 }  // namespace af

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Poses of a CT in the room, in and out, in the formats of this and other programs. docs/poses.md
-// states every format's frames.
+// Poses of a CT in the room, in and out, in the formats of docs/poses.md.
 #pragma once
 
 #include <array>
@@ -15,19 +14,15 @@
 
 namespace af {
 
-/// Every format, in the order in which a file is tried: they are told apart by content.
-std::span<const PoseFormat> pose_formats();
-/// Names of those that are written, too.
-std::vector<std::string> written_pose_formats();
-
-/// The format of a file that holds poses, by its content.
-const PoseFormat& format_of_pose_file(const PoseFileBytes& file);
+/// The format of a file that holds poses, by its content. InputError with the command that converts
+/// a file of another program.
+const PoseFormat& format_of_pose_file(const PoseFileBytes& file, const PoseContext& context = {});
 
 /// A pose file in memory; FileError when it is unreadable, empty or larger than 64 MiB.
 PoseFileBytes read_pose_bytes(const std::filesystem::path& path);
 
-/// All poses of a file, of any format. InputError when one is not rigid or `context` lacks what
-/// the format needs, FileError when it is damaged.
+/// All poses of a file. InputError when one is not rigid or `context` lacks what the format needs,
+/// FileError when it is damaged.
 PosesInFile read_pose_file(const std::filesystem::path& path, const PoseContext& context = {});
 
 /// The poses of a file, at least one. `notes`, if given, get what was left out and assumed.
@@ -45,12 +40,6 @@ std::vector<RigidTransform> read_unbroken_poses(const std::filesystem::path& pat
 RigidTransform read_pose(const std::filesystem::path& path,
                          const PoseContext& context = {},
                          std::vector<std::string>* notes = nullptr);
-
-/// The bytes of a file of the named format. InputError when the format is read only, holds one pose
-/// only, or lacks something of `context`.
-std::string pose_file_bytes(const std::string& format,
-                            std::span<const RigidTransform> room_from_ct,
-                            const PoseContext& context);
 
 /// A pose as the rows of its matrix, as result.json and summaries hold it, and back: InputError
 /// that begins with `where` when these are not four rows of four numbers, or not rigid.

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "base/error.h"
 #include "base/joined.h"
@@ -19,21 +19,7 @@ namespace af {
 namespace {
 
 constexpr const char* kPoseKey = "room_from_ct";
-
-/// Row by row; what follows a # on its line is a comment.
-RigidTransform pose_of_plain_numbers(const std::string& text, const std::string& file) {
-  std::string without_comments;
-  std::istringstream lines(text);
-  for (std::string line; std::getline(lines, line);)
-    without_comments += line.substr(0, line.find('#')) + "\n";
-  const std::vector<double> numbers = numbers_of(without_comments, file);
-  constexpr std::size_t kCount = 16;
-  if (numbers.size() != kCount)
-    throw FileError(
-        file, "pose", "16 numbers of room_from_ct, row by row", std::to_string(numbers.size()));
-  return rigid_or_throw(
-      Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(numbers.data()), file);
-}
+constexpr const char* kStartIndex = "start_index";
 
 /// What of a file is not read; no note for an empty list.
 std::vector<std::string> notes_on(const std::vector<std::string>& unread, const std::string& file) {
@@ -102,6 +88,18 @@ RigidTransform parameters_of_row(const CsvTable& table, std::size_t row, const P
   std::array<double, 6> values{};
   for (std::size_t i = 0; i < values.size(); ++i) values[i] = table.number(row, kParameterNames[i]);
   return pose_of_deg_and_mm(frame, values, table.where(row));
+}
+
+/// By its place, or as the table says of poses that others left gaps between.
+std::int64_t number_of_row(const CsvTable& table, std::size_t row) {
+  if (!table.find_column(kStartIndex)) return static_cast<std::int64_t>(row + 1);
+  constexpr double kMost = 1e9;
+  const double index = table.number(row, kStartIndex);
+  if (!(index >= 0.0 && index <= kMost) || index != std::floor(index))
+    throw InputError(table.where(row) + ": " + kStartIndex,
+                     table.text(row, kStartIndex),
+                     "must be a whole number from 0 to 1e9");
+  return static_cast<std::int64_t>(index) + 1;
 }
 
 void check_parameter_columns(const CsvTable& table, const std::string& file) {
@@ -173,29 +171,6 @@ PosesInFile read_toml_pose(const PoseFileBytes& file, const PoseContext& /*conte
   return poses_of_toml(file.bytes, file.path.string());
 }
 
-std::string write_toml_pose(std::span<const RigidTransform> room_from_ct,
-                            const PoseContext& /*context*/) {
-  return pose_to_toml(only_pose(room_from_ct, "toml"));
-}
-
-bool is_plain_pose(const PoseFileBytes& file) {
-  return file.bytes.find('\0') == std::string::npos;
-}
-
-PosesInFile read_plain_pose(const PoseFileBytes& file, const PoseContext& /*context*/) {
-  return {{{1, pose_of_plain_numbers(file.bytes, file.path.string())}}, {}};
-}
-
-std::string write_plain_pose(std::span<const RigidTransform> room_from_ct,
-                             const PoseContext& /*context*/) {
-  const RigidTransform& pose = only_pose(room_from_ct, "matrix");
-  std::string text;
-  for (int row = 0; row < 4; ++row)
-    for (int column = 0; column < 4; ++column)
-      text += number_text(pose.matrix()(row, column)) + (column == 3 ? "\n" : " ");
-  return text;
-}
-
 bool is_csv_of_poses(const PoseFileBytes& file) {
   const std::string first_line = file.bytes.substr(0, file.bytes.find('\n'));
   return first_line.find("rx_deg") != std::string::npos ||
@@ -216,29 +191,17 @@ PosesInFile read_csv_of_poses(const PoseFileBytes& file, const PoseContext& cont
                        ": rx_deg ... tz_mm are relative to a nominal pose, which is not known "
                        "here; give m00 ... m23 (room_from_ct) instead");
   }
-  const std::vector<std::string> read =
+  std::vector<std::string> read =
       has_matrix ? matrix_columns(matrix_rows)
                  : std::vector<std::string>(kParameterNames.begin(), kParameterNames.end());
+  read.emplace_back(kStartIndex);
   PosesInFile found{{}, notes_on(unread_columns(table, read), name)};
   found.poses.reserve(table.row_count());
   for (std::size_t row = 0; row < table.row_count(); ++row)
-    found.poses.push_back({static_cast<std::int64_t>(row + 1),
+    found.poses.push_back({number_of_row(table, row),
                            has_matrix ? matrix_of_row(table, row, matrix_rows)
                                       : parameters_of_row(table, row, *context.frame)});
   return found;
-}
-
-std::string write_csv_of_poses(std::span<const RigidTransform> room_from_ct,
-                               const PoseContext& /*context*/) {
-  CsvTable table(matrix_columns(3));
-  for (const RigidTransform& pose : room_from_ct) {
-    std::vector<std::string> cells;
-    for (int row = 0; row < 3; ++row)
-      for (int column = 0; column < 4; ++column)
-        cells.push_back(number_text(pose.matrix()(row, column)));
-    table.add_row(cells);
-  }
-  return table.to_text();
 }
 
 }  // namespace af

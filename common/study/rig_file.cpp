@@ -5,9 +5,9 @@
 
 #include "base/error.h"
 #include "base/joined.h"
-#include "camera_files/camera_formats.h"
-#include "camera_files/format_readers.h"
+#include "camera_files/matrix_text.h"
 #include "files/output_file.h"
+#include "text/foreign_file.h"
 
 namespace af {
 
@@ -18,6 +18,12 @@ namespace {
 bool is_there(const fs::path& path) {
   std::error_code ignored;
   return fs::status(path, ignored).type() != fs::file_type::not_found;
+}
+
+/// A damaged rig.toml is one, too: its reader says where it goes wrong.
+bool is_rig_toml(const fs::path& path, const std::string& text) {
+  return !has_foreign_mark(text) &&
+         (path.extension() == ".toml" || text.find("[[camera]]") != std::string::npos);
 }
 
 }  // namespace
@@ -43,18 +49,23 @@ CameraRig read_rig(const std::string& name_or_paths, std::vector<std::string>* w
     if (!is_there(file))
       throw FileError(file.string(),
                       "no such file, and not a shipped rig (" + joined(builtin_rig_names()) + ")");
-  if (files.size() > 1) return read_camera_files(files, {}, warnings);
-  // A text of no format is taken for a rig.toml, whose reader says where it goes wrong.
-  const CameraFile file = CameraFile::open(files.front());
-  const CameraFormat* const format = recognised_camera_format(file);
-  if (format != nullptr && format->read != read_rig_toml)
-    return read_camera_files(files, {}, warnings);
-  // The rest are bytes: a format that cannot be told, or a damaged one.
-  if (format == nullptr && file.text.empty() && !file.head.empty() &&
-      std::filesystem::file_size(files.front()) <= CameraFile::kMostTextBytes)
-    return read_camera_files(files, {}, warnings);
-  return parse_rig(
-      read_text_file(files.front(), CameraFile::kMostTextBytes), files.front().string(), warnings);
+  if (files.size() > 1)
+    throw needs_conversion(files, "a rig is one file, a rig.toml", "", "rig.toml");
+  constexpr std::size_t kMostBytes = std::size_t{64} << 20;
+  const fs::path& file = files.front();
+  const std::string text = read_text_file(file, kMostBytes);
+  if (is_rig_toml(file, text)) return parse_rig(text, file.string(), warnings);
+  if (!is_matrix_text(text))
+    throw needs_conversion(files, "is neither a rig.toml nor projection matrices", "", "rig.toml");
+  const std::string toml = rig_toml_of_matrices(text);
+  if (toml.empty())
+    throw needs_conversion(files,
+                           "its comments do not state '# isocenter_point X Y Z' and, before each "
+                           "matrix, '# camera NAME', '# size_px COLUMNS ROWS' and "
+                           "'# pixel_spacing_mm COLUMN ROW'",
+                           "",
+                           "rig.toml");
+  return parse_rig(toml, file.string(), warnings);
 }
 
 }  // namespace af

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The rig that an option or a study names: a shipped one, a rig.toml, or camera files of any format
-// that is told by its content.
+// The rig that an option or a study names: a shipped one, a rig.toml, or matrices as text.
 #pragma once
 
 #include <filesystem>
@@ -12,14 +11,12 @@
 
 namespace af {
 
-/// Reads a rig by shipped name, from a file, or from several files with commas between them
-/// ("cam01.txt,cam02.txt"), in any format of camera_formats(). InputError (exit 3) for a bad rig:
-/// names file, line, camera, key, value, constraint, and what a file leaves open with the option of
-/// af-inspect that states it; FileError (exit 4) when unreadable. `warnings` receives e.g. "camera
-/// 'A': mirrored ...".
+/// Reads a rig by shipped name or from a file. InputError (exit 3) for a bad rig: names file, line,
+/// camera, key, value, constraint; and for files of another program, with the command that converts
+/// them. FileError (exit 4) when unreadable. `warnings` receives e.g. "camera 'A': mirrored ...".
 CameraRig read_rig(const std::string& name_or_paths, std::vector<std::string>* warnings = nullptr);
 
-/// The files that a rig's name stands for; empty for a shipped rig.
+/// The files that a rig's name stands for, with commas between them; empty for a shipped rig.
 std::vector<std::filesystem::path> rig_files(const std::string& name_or_paths);
 
 }  // namespace af

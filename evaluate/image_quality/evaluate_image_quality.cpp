@@ -29,10 +29,10 @@
 #include "run/terminal.h"
 #include "study/ct_keys.h"
 #include "study/node_ct.h"
-#include "study/pose_context.h"
 #include "study/rig_file.h"
 #include "study/study_file.h"
 #include "text/options_toml.h"
+#include "text/shell_words.h"
 
 namespace af::evaluation {
 namespace {
@@ -150,12 +150,8 @@ Setup load(const ImageQualityOptions& options, const Target& target, const Commu
                        target.field.string());
     choose_camera(target, setup);
     if (options.poses.empty()) return;
-    setup.poses = read_poses(options.poses,
-                             pose_context(target.ct,
-                                          target.ct_reading,
-                                          CameraRig{Eigen::Vector3d::Zero(), {setup.view.camera}},
-                                          identity.frame),
-                             &notes);
+    setup.poses =
+        read_poses(options.poses, {identity.frame, "--ct " + shell_quoted(target.ct)}, &notes);
   });
   for (const std::string& text : notes) warn(world, text);
   if (!setup.camera_distance.is_none())

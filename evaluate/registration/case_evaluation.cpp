@@ -36,8 +36,8 @@
 #include "run/stop_request.h"
 #include "run/terminal.h"
 #include "study/node_ct.h"
-#include "study/pose_context.h"
 #include "study_pictures/study_pictures.h"
+#include "text/foreign_file.h"
 #include "text/options_toml.h"
 
 namespace af::evaluation {
@@ -502,7 +502,7 @@ PoseTableFrames pose_table_frames(const RegistrationStudyOptions& options,
           {known.begin(), known.end()},
           PoseFrame::about(gold_room_from_ct, study_case.center_ct_mm),
           PoseFrame::about(study_case.nominal_room_from_ct, study_case.center_ct_mm),
-          pose_context(study, study_case, options.ct)};
+          {study_case.frame(), conversion_options(options.study, study_case.name)}};
 }
 
 StratifiedStarts given_starts(const RegistrationStudyOptions& options,

@@ -134,7 +134,7 @@ std::optional<std::pair<std::string, std::int64_t>> split_stem(const std::string
 /// Whether a file of a folder may be one of poses, by its name.
 bool is_named_like_a_pose(const std::filesystem::path& path) {
   static const std::set<std::string> extensions = {
-      ".tfm", ".h5", ".dcm", ".json", ".toml", ".tra", ".txt"};
+      ".tfm", ".h5", ".dcm", ".json", ".toml", ".tra", ".txt"};  // foreign ones are refused by name
   return extensions.contains(path.extension().string());
 }
 

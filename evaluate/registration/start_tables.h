@@ -46,11 +46,12 @@ struct FoundPoses {
 /// The poses of one case: a CSV file with start_index, optionally case and seconds, and m00 ... m23
 /// of room_from_ct, or final_rx_deg ... final_tz_mm relative to gold (as in registrations.csv), or
 /// rx_deg ... tz_mm relative to the nominal pose, about the ROI centre. Or a folder of files of one
-/// pose each (docs/poses.md), named [CASE-]INDEX.tfm, .h5, .dcm, .json, .toml, .tra or .txt. Or one
-/// file of several poses that is no table: its first frame or row is start 0 of the only case, and
-/// frames without a pose leave their start without one. InputError for seconds below 0. Reported as
-/// problems: a pose with a value that is not finite (no pose), a start that occurs twice (the first
-/// counts, even if it is no pose) and a start_index that is not a whole number (no start).
+/// pose each (docs/poses.md), named [CASE-]INDEX.tfm, .json or .toml; foreign ones are refused. Or
+/// one file of several poses that is no table: its first frame or row is start 0 of the only case,
+/// and frames without a pose leave their start without one. InputError for seconds below 0.
+/// Reported as problems: a pose with a value that is not finite (no pose), a start that occurs
+/// twice (the first counts, even if it is no pose) and a start_index that is not a whole number (no
+/// start).
 FoundPoses read_found_poses(const std::filesystem::path& path, const PoseTableFrames& frames);
 
 /// Says which cases in a table or folder of poses are not among `known`, so that their omission is

@@ -25,7 +25,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fuzz::require(again.columns() == table->columns() && again.row_count() == table->row_count() &&
                     again.to_text() == table->to_text(),
                 "a table reads back as it was written");
-  fuzz::is_accepted([&] { (void)read_pose_file(path, {PoseFrame(), {}, {}, {}}); });
+  fuzz::is_accepted([&] { (void)read_pose_file(path, {PoseFrame(), {}}); });
   evaluation::PoseTableFrames frames;
   frames.case_name = "skull-01";
   std::vector<std::string> notes;

@@ -7,7 +7,6 @@
 
 #include "evaluate/registration/start_tables.h"
 #include "fuzz/fuzz_input.h"
-#include "fuzz/sample_pose_context.h"
 
 namespace {
 
@@ -35,7 +34,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fs::create_directories(folder);
   evaluation::PoseTableFrames frames;
   frames.case_name = "skull-01";
-  frames.context = fuzz::sample_pose_context();
+  frames.context.frame = PoseFrame();
   frames.is_only_case = input.take<std::uint8_t>() % 2 == 0;
   std::vector<fs::path> files;
   for (int i = 0; i < kMostFiles && !input.empty(); ++i) {

@@ -12,10 +12,8 @@
 
 #include "base/error.h"
 #include "base/stored_bytes.h"
-#include "camera_files/camera_formats.h"
 #include "evaluate/registration/registration_rows.h"
 #include "files/output_file.h"
-#include "hdf5_files/hdf5_output.h"
 #include "image_files/ct_reader.h"
 #include "image_files/image_file.h"
 #include "pose_files/pose_file.h"
@@ -82,23 +80,6 @@ void write_toml_seeds(const fs::path& folder) {
           optional, std::regex("(fiducials|landmarks)_px = \\[\\[[^\\]]*\\]"), "$1_px = [[]"));
 }
 
-/// What DeepFluoro's files have beside their volumes.
-std::string deep_fluoro_seed() {
-  Hdf5Output file;
-  const std::string group = "/proj-params";
-  file.add_group(group);
-  file.add_matrix(group + "/intrinsic",
-                  (Eigen::Matrix3d() << -500, 0, 31.5, 0, -500, 23.5, 0, 0, 1).finished());
-  Eigen::Matrix4d extrinsic = Eigen::Matrix4d::Identity();
-  extrinsic(2, 3) = -700.0;
-  file.add_matrix(group + "/extrinsic", extrinsic);
-  file.add_count(group + "/num-cols", 64);
-  file.add_count(group + "/num-rows", 48);
-  file.add_scalar(group + "/pixel-col-spacing", 0.5);
-  file.add_scalar(group + "/pixel-row-spacing", 0.5);
-  return file.bytes();
-}
-
 /// An enhanced XA file of two frames.
 test::DicomTestFile enhanced_seed(test::DicomTestFile file) {
   test::DicomTestFile geometry;
@@ -119,61 +100,6 @@ test::DicomTestFile enhanced_seed(test::DicomTestFile file) {
   return file;
 }
 
-/// Both shipped rigs in every format that can state them, also with the images' rows turned around,
-/// each with all options and with none.
-void write_camera_seeds(const fs::path& folder) {
-  for (const std::string& name : builtin_rig_names()) {
-    CameraRig rig = parse_rig(builtin_rig_text(name), name);
-    for (const bool flips : {false, true}) {
-      for (CameraGeometry& camera : rig.cameras)
-        if (flips) camera.row_direction = -camera.row_direction;
-      for (const CameraFormat& format : camera_formats()) {
-        if (format.write == nullptr) continue;
-        const CameraRig one = {rig.isocenter_point, {rig.cameras.front()}};
-        std::string bytes;
-        try {
-          bytes = format.write(format.holds_one_camera ? one : rig);
-        } catch (const InputError&) {
-          continue;  // the format cannot state it
-        }
-        const std::string stem = format.name + ("-" + name) + (flips ? "-flipped" : "");
-        write_seed(folder / "camera" / stem, "\0"s + bytes);
-        write_seed(folder / "camera" / (stem + "-options"), "\7"s + bytes);
-      }
-    }
-  }
-  write_seed(folder / "camera" / "command",
-             "\0plastimatch drr --nrm \"0 -1 0\" --vup '0 0 1' --sad 800 --sid=1200 -r \"64 48\" "
-             "-z \"240 200\" ct.mha\n"s);
-  write_seed(folder / "camera" / "deep-fluoro", "\4"s + deep_fluoro_seed());
-  CameraRig lens = parse_rig(builtin_rig_text("c-arm-12in"), "rig");
-  lens.cameras.resize(1);
-  lens.cameras[0].distortion = {{-0.35, 0.12, 0.004, -0.003, 0.05}};
-  for (const char* format : {"rig", "opencv"})
-    write_seed(folder / "camera" / (format + "-distortion"s),
-               "\x08"s + camera_files_of(lens, format, "camera").front().bytes);
-  write_seed(folder / "camera" / "opencv-lists",
-             "\3K:\n- - 1200\n  - 0\n  - 255.5\n- [0, 1100, 200]\n- [0, 0,\n1]  # end\n"
-             "dist:\n  - -0.35\n  - 0.12\n  - 4e-3\n  - -0.003\nrvec: [0.3, -0.2, 0.5]\n"
-             "tvec:\n- [10]\n- [-20]\n- [900]\n"s);
-  test::DicomTestFile image;
-  image.set_text({0x0008, 0x0060}, "CS", "XA");
-  image.set_u16({0x0028, 0x0010}, 48);
-  image.set_u16({0x0028, 0x0011}, 64);
-  image.set_text({0x0018, 0x1164}, "DS", "0.4\\0.3");
-  image.set_text({0x0018, 0x1500}, "CS", "DYNAMIC");
-  image.set_text({0x0028, 0x0008}, "IS", "2");
-  image.set_text({0x0018, 0x1520}, "DS", "1.5");
-  image.set_text({0x0020, 0x0020}, "CS", "L\\F");
-  image.write(folder / "camera" / "dicom-header");
-  write_seed(folder / "camera" / "dicom",
-             "\x10"s + read_text_file(folder / "camera" / "dicom-header"));
-  enhanced_seed(image).write(folder / "camera" / "dicom-header");
-  write_seed(folder / "camera" / "dicom-enhanced",
-             "\0"s + read_text_file(folder / "camera" / "dicom-header"));
-  fs::remove(folder / "camera" / "dicom-header");
-}
-
 void write_table_seeds(const fs::path& folder) {
   write_seed(folder / "csv" / "parameters",
              "rx_deg,ry_deg,rz_deg,tx_mm,ty_mm,tz_mm\r\n1,-2,3e0,0.5,+4,\"5\"\r\n");
@@ -189,28 +115,12 @@ void write_table_seeds(const fs::path& folder) {
 }
 
 void write_pose_seeds(const fs::path& folder) {
-  write_seed(folder / "pose" / "plain", "\0# by row\n1 0 0 5\n0 1 0 6, 0 0 1 7\n0 0 0 1\n"s);
   write_seed(folder / "pose" / "toml", "\1"s + pose_to_toml(some_pose()));
   write_seed(folder / "pose" / "affine", "\2"s + pose_to_itk_transform(some_pose()));
   write_seed(folder / "pose" / "versor",
              "\2#Insight Transform File V1.0\nTransform: VersorRigid3DTransform_double_3_3\n"
              "Parameters: 0.1 0 0.2 1 2 3\nFixedParameters: 0 0 1\n"s);
-  PoseContext context;
-  context.ct_grid = [] {
-    CtGrid grid;
-    grid.size = {20, 30, 40};
-    return grid;
-  };
-  context.rig = [] {  // of one camera: a pose of DiffDRR belongs to one
-    CameraRig rig = parse_rig(builtin_rig_text("c-arm-12in"), "c-arm-12in");
-    rig.cameras.resize(1);
-    return rig;
-  };
-  const RigidTransform pose = some_pose();
-  for (const char* format : {"dicom", "itk-hdf5", "diffdrr", "csv"})
-    write_seed(folder / "pose" / format, "\0"s + pose_file_bytes(format, {&pose, 1}, context));
-  write_seed(folder / "pose" / "autoscoper",
-             "\4"s + pose_file_bytes("autoscoper", {&pose, 1}, context));
+  write_seed(folder / "pose" / "csv", "\0rx_deg,ry_deg,rz_deg,tx_mm,ty_mm,tz_mm\n1,2,3,4,5,6\n"s);
   write_seed(folder / "pose" / "euler",
              "\2#Insight\nTransform: Euler3DTransform_double_3_3\nParameters: 0.1 0.2 0.3 4 5 6\n"
              "FixedParameters: 10 20 30 1\n"s);
@@ -240,8 +150,6 @@ void write_found_poses_seeds(const fs::path& folder) {
   };
   seed("transforms", found_poses_input({{0, pose_to_itk_transform(pose)}, {3, plain}}));
   seed("of-a-case", found_poses_input({{1, json}, {2, pose_to_toml(pose)}, {4, film}}));
-  seed("hdf5", found_poses_input({{6, pose_file_bytes("itk-hdf5", {&pose, 1}, {})}}));
-  seed("dicom", found_poses_input({{5, pose_file_bytes("dicom", {&pose, 1}, {})}}));
   seed("names", found_poses_input({{7, plain}, {8, plain}, {9, pose_to_toml(pose)}}));
 }
 
@@ -304,10 +212,10 @@ void write_inspect_seeds(const fs::path& folder) {
   write_image(xray, image, 1.0, 1.0);
   seed("xray", '\0', read_text_file(image));
   fs::remove(image);
-  CameraRig rig = parse_rig(builtin_rig_text("c-arm-12in"), "rig");
-  rig.cameras.resize(1);
-  for (const char* format : {"mayacam2", "opencv", "matrix", "plastimatch", "elastix"})
-    seed(format, '\0', camera_files_of(rig, format, "camera").front().bytes);
+  seed("matrices",
+       '\0',
+       "# isocenter_point 0 0 0\n# camera A\n# size_px 9 9\n# pixel_spacing_mm 1 1\n"
+       "100 4 0 800\n0 4 -100 800\n0 1 0 200\n");
 }
 
 void write_image_seeds(const fs::path& folder) {
@@ -486,7 +394,6 @@ int main(int argc, char** argv) {
   try {
     const fs::path folder = argv[2];
     write_toml_seeds(folder);
-    write_camera_seeds(folder);
     write_table_seeds(folder);
     write_pose_seeds(folder);
     write_image_seeds(folder);

@@ -9,7 +9,7 @@ usage() {
   cat <<'TEXT'
 Usage: tests/fuzz/run.sh [--seconds N] [--output FOLDER] [--no-build] [--help] [NAME...]
 
-Runs libFuzzer on our readers: rig, camera, study, scan, csv, pose, found_poses, image, dicom, dicom_xray, dicom_ct, inspect, journal, rows,
+Runs libFuzzer on our readers: rig, study, scan, csv, pose, found_poses, image, dicom, dicom_xray, dicom_ct, inspect, journal, rows,
 field_values, field_file, shards, or those named. Needs clang-14. Corpora grow in FOLDER/NAME/corpus, the log is FOLDER/NAME/log, inputs that are findings are
 FOLDER/NAME/crash-*, oom-* or timeout-*. Exit code 1 when there was a finding.
 
@@ -32,7 +32,7 @@ while (($# > 0)); do
   esac
   shift
 done
-((${#names[@]} > 0)) || names=(rig camera study scan csv pose found_poses image dicom dicom_xray dicom_ct inspect journal rows field_values field_file shards)
+((${#names[@]} > 0)) || names=(rig study scan csv pose found_poses image dicom dicom_xray dicom_ct inspect journal rows field_values field_file shards)
 
 binaries=$af_root/build/fuzz/tests/fuzz
 if [[ "$build" == yes ]]; then
@@ -55,7 +55,7 @@ for name in "${names[@]}"; do
   # it is refused: terabytes, before it compares with the file's size.
   case $name in
     field_file | shards) leaks=0 ;;
-    camera | pose | found_poses) leaks=0 most_mb=100000000 is_null=1 ;;
+    pose | found_poses) leaks=0 most_mb=100000000 is_null=1 ;;
   esac
   ASAN_OPTIONS=quarantine_size_mb=16:malloc_context_size=4:detect_leaks=$leaks:allocator_may_return_null=$is_null "$binaries/fuzz_$name" -max_total_time="$seconds" -timeout="${AF_FUZZ_TIMEOUT:-30}" -rss_limit_mb=1024 -malloc_limit_mb="$most_mb" -detect_leaks=$leaks \
     -print_final_stats=1 corpus "$output/seeds/$name" >log 2>&1 || status=1

@@ -37,14 +37,14 @@ depends() {
   done
 }
 
-python_programs=(af-report)
+python_programs=(af-convert af-report)
 programs=(af-precompute af-drr af-simulate af-scan af-register af-evaluate af-inspect)
 for program in "${programs[@]}" "${python_programs[@]}"; do
   holds attenuation-fields "bin/$program" "share/man/man1/$program.1.gz" "share/bash-completion/completions/$program"
 done
 holds attenuation-fields libexec/attenuation-fields/slicer/af-drr libexec/attenuation-fields/slicer/af-register \
   share/doc/attenuation-fields/copyright
-depends attenuation-fields python3 python3-jinja2 python3-matplotlib openmpi-bin libc6 libhdf5-openmpi libinsighttoolkit
+depends attenuation-fields python3 python3-h5py python3-jinja2 python3-matplotlib python3-numpy python3-pydicom python3-yaml openmpi-bin libc6 libhdf5-openmpi libinsighttoolkit
 library=$(basename "$(ls "$scratch"/packages/libattenuation-fields[0-9]*.deb)" | sed 's/_.*//')
 if [[ -n "$library" ]]; then
   holds libattenuation-fields-dev include/attenuation_fields/attenuation_fields.h include/attenuation_fields/version.h

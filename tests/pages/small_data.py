@@ -34,7 +34,7 @@ def main():
             shutil.move(file, folder / file.name)
     shutil.rmtree(folder / "made")
     if "cam01.txt" in wanted:
-        output_of("af-inspect", "--rig-from", "rig.toml", "--rig-to", "mayacam2", "-o", "cam.txt", folder=folder)
+        output_of("af-convert", "rig.toml", "--to", "mayacam2", "-o", "cam.txt", folder=folder)
         for name, number in (("A", "01"), ("B", "02")):
             (folder / f"cam-{name}.txt").rename(folder / f"cam{number}.txt")
     if "results/" in wanted:

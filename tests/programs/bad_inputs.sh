@@ -152,49 +152,21 @@ of_rig 3 'pixel_spacing' 'unknown key (typo)' "$(edited rig.toml '0,/^pixel_spac
 of_rig 3 'source_point' 'source at 1e300 mm' "$(edited rig.toml '0,/^source_point = .*/s//source_point = [0, 1e300, 0]/')"
 of_rig 3 'pixel_spacing_mm' 'pixels of 1e300 mm' "$(edited rig.toml '0,/^pixel_spacing_mm = .*/s//pixel_spacing_mm = [1e300, 3]/')"
 of_rig 4 'c-arm-9in' 'unknown shipped rig' c-arm-9in
-# Cameras of other programs, in files that af-inspect writes here.
-for format in mayacam2 opencv matrix elastix plastimatch xreg diffdrr; do
-  "$bin/af-inspect" --rig-from valid/rig.toml --rig-to "$format" -o "valid/camera-$format.txt" >message.txt 2>&1 ||
-    { echo "af-inspect could not write valid/camera-$format.txt" >&2; exit 1; }
-done
-of_rig 4 'truncated' 'MayaCam cut short' "$(edited camera-mayacam2-AP.txt '/^translation/q')"
-of_rig 3 'finite' 'MayaCam with nan' "$(edited camera-mayacam2-AP.txt '/^translation/,/^end/s/^-?[0-9].*/nan/')"
-of_rig 4 "'rotation' is missing" 'MayaCam without rotation' "$(edited camera-mayacam2-AP.txt 's/^rotation/turn/')"
-of_rig 3 '32768' 'MayaCam of 1e18 columns' "$(edited camera-mayacam2-AP.txt '2s/.*/1e18,64/')"
-of_rig 4 'rows' 'OpenCV matrix of 1e12 rows' "$(edited camera-opencv-AP.txt '0,/rows: 3/s//rows: 1000000000000/')"
-of_rig 3 'x_camera = R x_room + t' 'OpenCV without R' "$(edited camera-opencv-AP.txt 's/^R:/Q:/')"
-of_rig 3 'must be a rotation' 'OpenCV with a mirrored R' "$(edited camera-opencv-AP.txt '/^R:/,/data/s/data: .*/data: [ 1, 0, 0, 0, 1, 0, 0, 0, -1 ]/')"
-of_rig 3 'finite' 'matrix with inf' "$(edited camera-matrix.txt 's/^-?[0-9][^ ]*/inf/')"
-of_rig 3 '--rig-size-px' 'plastimatch without the size of the images' valid/camera-plastimatch-AP.txt
-of_rig 3 'Origin' 'elastix without the origin' "$(edited camera-elastix-AP.txt 's/^[(]Origin/(Orient/')"
-of_rig 4 'not closed' 'elastix cut short' "$(edited camera-elastix-AP.txt 's/^[(]FocalPoint.*/(FocalPoint 1 2/')"
+# Cameras of other programs: af-convert is named, and the command for it.
+printf 'image size\n64,48\n' >'cam 1.txt'
+of_rig 3 "af-convert 'cam 1.txt' -o rig.toml" 'MayaCam' 'cam 1.txt'
+of_rig 3 "af-convert 'cam 1.txt' valid/rig.toml -o rig.toml" 'several files' 'cam 1.txt,valid/rig.toml'
 printf '<RTKThreeDCircularGeometry><Projection>' >cut.xml
+of_rig 3 'af-convert cut.xml -o rig.toml' 'RTK geometry' cut.xml
+of_rig 3 'af-convert AP.af.h5 -o rig.toml' 'a field as a rig' AP.af.h5
+printf '1 0 0 5\n0 1 0 6\n0 0 1 7\n' >bare-matrix.txt
+of_rig 3 "'# isocenter_point X Y Z'" 'a matrix that states nothing else' bare-matrix.txt
+matrix=$'# isocenter_point 0 0 0\n# camera AP\n# size_px 64 48\n# pixel_spacing_mm 3 3\n'
+printf '%sinf 0 0 5\n0 1 0 6\n0 0 1 7\n' "$matrix" >inf-matrix.txt
+of_rig 3 'projection_matrix' 'matrix with inf' inf-matrix.txt
 for numbers in '1, 2, 3' '[0.1]' '-500, 0, 0, 0' 'nan, 0, 0, 0' '0, 0, 0, 0, 0, -500, 0, 0' '1e300, 0, 0, 0'; do
   of_rig 3 'distortion' "distortion $numbers" "$(edited rig.toml "0,/^size_px = .*/s//&\ndistortion = [$numbers]/")"
 done
-of_rig 4 '4, 5, 8, 12 or 14 numbers' 'OpenCV distortion of two numbers' \
-  "$(edited camera-opencv-AP.txt '/^distortion/,/data/s/data: .*/data: [ 0.1, 0.2 ]/; /^distortion/,/data/s/rows: .*/rows: 2/')"
-lists="$(sed '/^distortion/,/data/d' valid/camera-opencv-AP.txt)"
-printf '%s\nD:\n- 0.1\n- 0.2\n' "$lists" >dashes.yml
-of_rig 4 '4, 5, 8, 12 or 14 numbers' 'OpenCV distortion of two numbers with dashes' dashes.yml
-printf '%s\nD:\n- [0.1, 0.2\n- 0\n' "$lists" >open.yml
-of_rig 4 'truncated: a list is not closed' 'OpenCV list with dashes that is not closed' open.yml
-of_rig 4 'broken XML' 'RTK geometry cut short' cut.xml
-printf '<!DOCTYPE a [<!ENTITY b "bbbb">]><RTKThreeDCircularGeometry/>' >entities.xml
-of_rig 4 'entities' 'RTK geometry with entities' entities.xml
-for bytes in 400 2000; do
-  head -c "$bytes" valid/camera-xreg.txt >"cut-$bytes.h5"
-  of_rig 4 'states no camera in a known format' "xReg's HDF5 of $bytes bytes" "cut-$bytes.h5"
-done
-of_rig 4 'known format' "a field as a rig" AP.af.h5
-rad=$'Size[pixels]: 64 48\nStep[mm]: 3 3\nDataType: float\nSourcePosition[mm]: 0 -650 0\nTPosition:\n1 0 0 -96\n0 0 -1 350\n'
-printf '%s' "$rad" >cut.rad
-of_rig 4 'TPosition has four lines' '.rad cut short' cut.rad
-printf '%s0 1 0 -72\n0 0 0 1\n' "${rad/-650/-1e300}" >far.rad
-of_rig 3 'source_point' '.rad with the source at 1e300 mm' far.rad
-of_rig 3 'must be above 0' 'DiffDRR with pixels of -3 mm' "$(edited camera-diffdrr.txt '0,/^delx = .*/s//delx = -3/')"
-of_rig 3 'between 1 and 32768' 'DiffDRR of 2e9 rows' "$(edited camera-diffdrr.txt '0,/^height = .*/s//height = 2000000000/')"
-of_rig 3 'neighbours different' 'DiffDRR with an unknown convention' "$(edited camera-diffdrr.txt '0,/^convention = .*/s//convention = "XXL"/')"
 of_rig 4 'edited-rig.toml' 'not TOML' "$(edited rig.toml '1s/^.*$/= 3/')"
 row 3 "valid/study.toml: --camera = OB: must be one that case 'ellipsoids' has: AP, LAT" 'camera that the case does not have' \
   "${precompute[@]}" --study valid/study.toml --camera OB
@@ -374,32 +346,12 @@ of_scan 4 'edited-scan.toml' 'a scan that is not TOML' "$(edited scan.toml '1s/^
 
 printf -- '--- poses of other programs ---\n'
 printf '%s\n' '1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1' >one.txt
-for format in dicom itk-hdf5; do
-  "$bin/af-inspect" one.txt --pose-to "$format" -o "one.$format"
-  for bytes in 100 400 800; do
-    head -c "$bytes" "one.$format" >"cut-$bytes.$format"
-    row 4 "cut-$bytes.$format" "$format pose of $bytes bytes" "${drr_of_ct[@]}" --pose "cut-$bytes.$format"
-  done
-done
-sed 's/RIGID /AFFINE/' one.dicom >affine.dicom
-row 3 'must be RIGID' 'affine registration' "${drr_of_ct[@]}" --pose affine.dicom
-nans=NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN
-printf '%s\n' "$nans" "$nans" >nan.tra
-row 3 'holds no pose' 'Autoscoper frames that were not tracked' "${drr_of_ct[@]}" --pose nan.tra
-printf '%s\n' "$nans" '2 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1' >scaled.tra
-row 3 'frame 2' 'Autoscoper frame not rigid' "${drr_of_ct[@]}" --pose scaled.tra
-printf '%s\n' '1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1' '1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1' >two.tra
-row 3 'one is expected' 'two frames as one pose' "${drr_of_ct[@]}" --pose two.tra
+row 3 'af-convert one.txt --ct valid/ct.nii.gz -o poses.csv' 'a pose of 16 numbers' "${drr_of_ct[@]}" --pose one.txt
+row 3 'af-convert one.txt --study valid/study.toml --case ellipsoids -o poses.csv' 'a start of 16 numbers' \
+  "${register_one[@]}" --start-pose one.txt
+row 3 'af-convert cut.xml -o converted.toml' 'RTK geometry for af-inspect' "$bin/af-inspect" cut.xml
 printf '%s\n' '#Insight' 'Transform: Euler3DTransform_double_3_3' 'Parameters: 1 2 3 4 5' 'FixedParameters: 0 0 0' >five.tfm
 row 4 'number of Parameters' 'Euler transform of five numbers' "${drr_of_ct[@]}" --pose five.tfm
-printf '%s\n' 'diffdrr_parameterization = "se3"' 'rotation_rad = [[0, 0, nan]]' 'translation_mm = [[0, 0]]' >bad-diffdrr.toml
-row 3 'diffdrr_parameterization' 'DiffDRR pose with mistakes' "${drr_of_ct[@]}" --pose bad-diffdrr.toml
-sed -E 's/^ct = .*/ct = "..\/two-series"/' valid/study.toml >valid/two-series.toml
-printf '%s\n' '1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1' >one.tra
-row 3 '--series = 9.9: no such series' 'Autoscoper start of a series not there' in_time \
-  "$bin/af-register" --study valid/two-series.toml --renderer raycast -o out/result --series 9.9 --start-pose one.tra
-row 2 'requires' 'a case without a study' "$bin/af-inspect" one.txt --pose-to toml --case a -o out/one.toml
-row 3 'Autoscoper' 'Autoscoper pose of no CT' "$bin/af-inspect" one.txt --pose-to autoscoper -o out/one.tra
 
 printf -- '--- outputs that are inputs ---\n'
 ln valid/ct.nii.gz hard.nii.gz

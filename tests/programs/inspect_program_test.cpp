@@ -143,23 +143,6 @@ TEST(AfInspect, RefusesADicomFolderWithTwoSeriesUntilOneIsChosen) {
   EXPECT_EQ(entry["facts"]["ct_content_sha256"], identity_of(ct).content_sha256);
 }
 
-TEST(AfInspect, ReadsAStudysCtAsTypedWhenItWritesPoses) {
-  const ScratchFolder folder;
-  test::write_small_study(folder.path());
-  const CtVolume ct = test::asymmetric_ct(test::small_grid());
-  test::write_dicom_series(ct, folder / "dicom", {}, "1.2.3.4", "A");
-  test::write_dicom_series(ct, folder / "dicom", {}, "1.2.3.5", "B");
-  write_text_file(folder / "series.toml",
-                  test::replaced(read_text_file(folder / "study.toml"), "ct.nii.gz", "dicom"));
-  write_text_file(folder / "one.txt", "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1\n");
-  const std::string command = (folder / "one.txt").string() + " --pose-to autoscoper -o " +
-                              (folder / "one.tra").string() + " --study " +
-                              (folder / "series.toml").string();
-  EXPECT_THAT(inspect(command).output, HasSubstr("2 DICOM series"));
-  const test::ProgramRun run = inspect(command + " --series 1.2.3.5");
-  EXPECT_EQ(run.exit_code, 0) << run.output;
-}
-
 TEST(AfInspect, KnowsUnfinishedWork) {
   const ScratchFolder folder;
   std::filesystem::create_directories(folder / "f.h5.progress");
@@ -210,23 +193,15 @@ TEST(AfInspect, DescribesRigsByNameAndFileAndWarnsOfMirroredOnes) {
   EXPECT_THAT(warnings, Contains(HasSubstr("mirrored")));
 }
 
-TEST(AfInspect, TakesTheIsocentreOfARigInEveryForm) {
+TEST(AfInspect, RefusesFilesOfOtherProgramsWithTheCommandThatConvertsThem) {
   const ScratchFolder folder;
-  write_bytes(folder / "cam.txt",
-              "image size\n1024,768\n\ncamera matrix\n5000,0,511.5\n0,5000,383.5\n0,0,1\n\n"
-              "rotation\n0,1,0\n0,0,-1\n-1,0,0\n\ntranslation\n0\n0\n1000\n");
-  const std::string from = "--rig-from " + (folder / "cam.txt").string() + " ";
-  const std::string out = " -o " + (folder / "rig.toml").string();
-  for (const std::string& line : {from + "--rig-isocenter-point=-10.5,20,30" + out,
-                                  from + "--rig-isocenter-point -10.5,20,30" + out,
-                                  "--rig-isocenter-point -10.5,20,30 " + from + out,
-                                  from + out + " --rig-isocenter-point -10.5 20 30"}) {
-    fs::remove(folder / "rig.toml");
-    const test::ProgramRun run = inspect(line);
-    EXPECT_EQ(run.exit_code, 0) << run.output;
-    EXPECT_EQ(read_rig((folder / "rig.toml").string()).isocenter_point,
-              Eigen::Vector3d(-10.5, 20, 30))
-        << line;
+  write_bytes(folder / "cam.txt", "image size\n1024,768\n");
+  write_bytes(folder / "pose.toml", "diffdrr_parameterization = \"quaternion\"\n");
+  for (const char* name : {"cam.txt", "pose.toml"}) {
+    const std::string path = (folder / name).string();
+    const test::ProgramRun run = inspect(path);
+    EXPECT_EQ(run.exit_code, 3) << run.output;
+    EXPECT_THAT(run.output, HasSubstr("af-convert " + path + " -o "));
   }
 }
 
@@ -235,8 +210,7 @@ TEST(AfInspect, RecognisesPosesTablesAndResults) {
   const RigidTransform pose(Eigen::Translation3d(1, 2, 3));
   write_bytes(folder / "pose.toml", pose_to_toml(pose));
   write_bytes(folder / "pose.tfm", pose_to_itk_transform(pose));
-  write_bytes(folder / "pose.txt", "1 0 0 1\n0 1 0 2\n0 0 1 3\n0 0 0 1\n");
-  for (const char* name : {"pose.toml", "pose.tfm", "pose.txt"}) {
+  for (const char* name : {"pose.toml", "pose.tfm"}) {
     const json entry = inspect_json((folder / name).string());
     EXPECT_EQ(entry["kind"], "pose") << name;
     EXPECT_EQ(entry["facts"]["room_from_ct"][1], json({0.0, 1.0, 0.0, 2.0})) << name;
@@ -432,8 +406,9 @@ TEST(AfInspect, PrintsATemplateThatItAccepts) {
 
 TEST(AfInspect, EndsWithTheWorstCodeButReportsEveryPath) {
   const ScratchFolder folder;
-  write_bytes(folder / "pose.txt", "2 0 0 0  0 1 0 0  0 0 1 0  0 0 0 1");  // not rigid
-  const std::string paths = "treatment-room " + (folder / "pose.txt").string() + " " +
+  write_bytes(folder / "pose.toml",
+              "room_from_ct = [[2,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]");  // not rigid
+  const std::string paths = "treatment-room " + (folder / "pose.toml").string() + " " +
                             (folder / "none").string() + " c-arm-12in";
   const test::ProgramRun run = json_run(paths);
   EXPECT_EQ(run.exit_code, 4);

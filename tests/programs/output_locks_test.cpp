@@ -113,8 +113,6 @@ TEST_F(OutputLocks, EveryProgramRefusesWhatAnotherJobWrites) {
           " --uv-nodes 8 --st-nodes 16 --codewords 16 -o " +
           path("taken.af.h5"),
       "af-register --study " + study + " --renderer raycast -o " + path("taken"),
-      "af-inspect --rig-from " + path("rig.toml") + " -o " + path("taken.toml"),
-      "af-inspect " + path("pose.toml") + " --pose-to toml -o " + path("taken.toml"),
       "af-inspect " + study + " --pictures " + path("taken")};
   for (const std::string& command : commands) {
     const test::ProgramRun run = test::run_command(line(command));

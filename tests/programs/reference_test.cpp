@@ -128,7 +128,8 @@ TEST(Reference, OfEveryProgramIsWhatItPrints) {
                            "af-scan",
                            "af-register",
                            "af-evaluate",
-                           "af-inspect"}) {
+                           "af-inspect",
+                           "af-convert"}) {
     const test::ProgramRun run =
         test::run_command(std::string(AF_PROGRAM_FOLDER "/") + name + " --help-as markdown");
     ASSERT_EQ(run.exit_code, 0) << run.output;

@@ -21,10 +21,10 @@
 #include "run/terminal.h"
 #include "spectrum/bone_volume.h"
 #include "study/ct_keys.h"
-#include "study/pose_context.h"
 #include "study/rig_file.h"
 #include "study/study_file.h"
 #include "text/csv_table.h"
+#include "text/shell_words.h"
 
 namespace af::tools {
 namespace {
@@ -97,7 +97,7 @@ void describe_pose(Fields& field, DrrOptions& options) {
   field("translation_mm",
         options.translation_mm,
         "tx,ty,tz along the room's axes, mm (default 0,0,0)");
-  field("pose", options.pose, "File with one pose of any format that docs/poses.md lists")
+  field("pose", options.pose, "File with one pose as TOML, JSON, CSV or ITK text (docs/poses.md)")
       .stands_for(PathRole::InputTransform, ".tfm");
   field("poses",
         options.poses,
@@ -343,10 +343,8 @@ DrrScene load_scene(const DrrOptions& options, const Communicator& communicator)
 std::vector<RigidTransform> requested_poses(const DrrOptions& options,
                                             const DrrScene& scene,
                                             std::vector<std::string>& notes) {
-  const PoseContext context = pose_context(scene.source.ct,
-                                           scene.source.ct_reading,
-                                           CameraRig{Eigen::Vector3d::Zero(), {scene.view.camera}},
-                                           scene.frame);
+  const std::string& ct = scene.source.ct;
+  const PoseContext context = {scene.frame, ct.empty() ? "" : "--ct " + shell_quoted(ct)};
   if (!options.poses.empty()) return read_poses(options.poses, context, &notes);
   if (!options.pose.empty()) return {read_pose(options.pose, context, &notes)};
   std::array<double, 6> values{};

@@ -4,7 +4,6 @@
 #include <map>
 #include <set>
 
-#include "camera_files/camera_formats.h"
 #include "field_use/field_coverage.h"
 #include "files/output_file.h"
 #include "files/sha256.h"
@@ -144,6 +143,9 @@ ordered_json case_json(const StudyCase& study_case,
     json["ct_reading"] = reading;
   const CtIdentity ct = identity_of(read_case_ct(study_case, ct_reading, &warnings));
   json["center_ct_mm"] = vector_json(study_case.center_ct_mm);
+  for (Eigen::Index row = 0; row < 4; ++row)
+    json["nominal_room_from_ct"].push_back(
+        vector_json(study_case.nominal_room_from_ct.matrix().row(row).transpose()));
   json["target_box_ct_mm"] = {vector_json(study_case.target_box_ct.low_mm),
                               vector_json(study_case.target_box_ct.high_mm)};
   json["fiducials"] = study_case.fiducials_ct_mm.size();
@@ -151,12 +153,6 @@ ordered_json case_json(const StudyCase& study_case,
   for (const StudyView& view : study_case.views)
     json["views"].push_back(view_json(study_case, view, rig, ct, warnings));
   return json;
-}
-
-/// Formats that state a pose relative to the CT's voxels or to a camera.
-bool needs_context(const PoseFormat& format) {
-  return std::string_view(format.name) == "autoscoper" ||
-         std::string_view(format.name) == "diffdrr";
 }
 
 double median_of(std::vector<double> values) {
@@ -235,17 +231,6 @@ void inspect_rig(const std::string& name_or_path, Inspection& inspection) {
                               [](const auto& /*camera*/, const auto& /*other*/) { return true; });
 }
 
-void inspect_camera_file(const fs::path& path, Inspection& inspection) {
-  inspection.kind = "cameras";
-  const CameraFormat* const format = recognised_camera_format(CameraFile::open(path));
-  if (format == nullptr) throw FileError(path.string(), "states no camera in a known format");
-  inspection.facts["format"] = format->name;
-  inspection.facts["format_is"] = format->help;
-  const auto rig = rig_json(read_camera_files({path}, {}, &inspection.warnings),
-                            [](const auto& /*camera*/, const auto& /*other*/) { return true; });
-  for (const auto& [key, value] : rig.items()) inspection.facts[key] = value;
-}
-
 void inspect_study(const fs::path& path, const CtReadOptions& options, Inspection& inspection) {
   inspection.kind = "study";
   const Study study = read_study(path, &inspection.warnings);
@@ -262,12 +247,7 @@ void inspect_pose(const fs::path& path, Inspection& inspection) {
   const PoseFileBytes file = read_pose_bytes(path);
   const PoseFormat& format = format_of_pose_file(file);
   inspection.facts["format"] = format.name;
-  if (needs_context(format)) {
-    inspection.facts["next_step"] = std::string("is relative to a CT or camera: af-inspect ") +
-                                    "--pose-to toml --study STUDY, or --ct and --rig, resolves it";
-    return;
-  }
-  const PosesInFile found = format.read(file, {PoseFrame{}, {}, {}, {}});
+  const PosesInFile found = format.read(file, {PoseFrame{}, {}});
   inspection.warnings.insert(inspection.warnings.end(), found.notes.begin(), found.notes.end());
   if (found.poses.size() != 1) {
     inspection.facts["poses"] = found.poses.size();
@@ -294,7 +274,7 @@ void inspect_csv(const fs::path& path, Inspection& inspection) {
       has_columns(table, {"m00", "m23"})) {
     inspection.kind = "poses";
     // The frame only gives the parameters a place; any frame is good enough to check them.
-    inspection.facts["poses"] = read_pose_file(path, {PoseFrame{}, {}, {}, {}}).poses.size();
+    inspection.facts["poses"] = read_pose_file(path, {PoseFrame{}, {}}).poses.size();
     return;
   }
   throw InputError(path.string() +

@@ -221,6 +221,8 @@ void inspect_ct(const fs::path& path, const CtReadOptions& options, Inspection& 
   const CtVolume ct = read_ct(path, options, &inspection.warnings);
   const HuStatistics hu(ct.hu.view());
   inspection.facts["geometry"] = grid_json(ct.grid);
+  if (const std::string uid = ct_frame_of_reference(path, options); !uid.empty())
+    inspection.facts["frame_of_reference_uid"] = uid;
   ordered_json& values = inspection.facts["values"];
   values["min_hu"] = hu.quantile(0.0);
   values["median_hu"] = hu.quantile(0.5);

@@ -21,7 +21,6 @@ void inspect_field(const std::filesystem::path& path,
                    const Communicator& communicator,
                    Inspection& inspection);
 void inspect_rig(const std::string& name_or_path, Inspection& inspection);
-void inspect_camera_file(const std::filesystem::path& path, Inspection& inspection);
 void inspect_study(const std::filesystem::path& path,
                    const CtReadOptions& options,
                    Inspection& inspection);

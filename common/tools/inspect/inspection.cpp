@@ -8,14 +8,11 @@
 #include <string_view>
 
 #include "base/joined.h"
-#include "camera_files/camera_formats.h"
+#include "camera_files/matrix_text.h"
 #include "files/input_file.h"
 #include "files/output_file.h"
 #include "image_files/dicom_series.h"
 #include "image_files/image_header.h"
-#include "pose_files/autoscoper_pose.h"
-#include "pose_files/dicom_registration.h"
-#include "pose_files/itk_transform.h"
 #include "pose_files/pose_file.h"
 #include "run/progress_journal.h"
 #include "study/node_ct.h"
@@ -23,6 +20,7 @@
 #include "study/study_file.h"
 #include "study_pictures/ct_pictures.h"
 #include "study_pictures/study_pictures.h"
+#include "text/foreign_file.h"
 #include "tools/inspect/inspect_kinds.h"
 
 namespace af {
@@ -40,8 +38,9 @@ constexpr std::string_view kHdf5Mark = "\x89HDF\r\n\x1a\n";
 constexpr const char* kWhatWasTried =
     "; tried: DICOM folder, result folder, unfinished work (NAME.progress), HDF5 "
     "field, NIfTI, MetaImage, NRRD, TIFF, PNG, DICOM file, TOML rig, study or pose, JSON result, "
-    "CSV table, pose (ITK, DICOM registration, DiffDRR, Autoscoper, 16 numbers), name of a shipped "
-    "rig, and cameras as MayaCam, OpenCV YAML, xReg's HDF5 or 3x4 matrices";
+    "CSV table, pose as ITK's text, name of a shipped rig, and cameras as 3x4 matrices. Cameras "
+    "and "
+    "poses of other programs are converted by af-convert";
 
 FileError not_recognised(const fs::path& path) {
   return {path.string(), "not recognised" + foreign_content(path) + kWhatWasTried};
@@ -73,57 +72,41 @@ bool has_line(std::string_view text, std::string_view start) {
   return false;
 }
 
-/// Poses are small; other HDF5 and DICOM files need not be.
-bool is_small_file(const fs::path& path) {
-  constexpr std::uintmax_t kMostBytes = 1u << 20;
-  std::error_code error;
-  const std::uintmax_t bytes = fs::file_size(path, error);
-  return !error && bytes > 0 && bytes <= kMostBytes;
-}
+/// The bytes in which texts, and small HDF5 and DICOM files, have their marks.
+constexpr std::size_t kMarkedBytes = 1u << 18;
 
-bool is_sixteen_numbers(const std::string& text) {
-  std::istringstream words(text);
-  std::size_t count = 0;
-  for (double number = 0.0; words >> number;) ++count;
-  return words.eof() && count == 16;
+void refuse_foreign(const fs::path& path, std::string_view beginning) {
+  if (has_foreign_mark(beginning))
+    throw needs_conversion({&path, 1}, "is no format of these programs", "", "converted.toml");
 }
 
 void inspect_text(const fs::path& path, const CtReadOptions& options, Inspection& inspection) {
-  constexpr std::size_t kTextBytes = 1u << 18;
-  const std::string text = first_bytes(path, kTextBytes);
+  const std::string text = first_bytes(path, kMarkedBytes);
   if (!is_text(text)) throw not_recognised(path);
   if (has_line(text, "[[case]]")) return inspect_study(path, options, inspection);
-  if (has_line(text, "[[camera]]")) return inspect_rig(path.string(), inspection);
+  if (has_line(text, "[[camera]]") || is_matrix_text(text))
+    return inspect_rig(path.string(), inspection);
   const std::size_t first = text.find_first_not_of(" \t\r\n");
   if (first != std::string::npos && text[first] == '{') return inspect_json(path, inspection);
-  if (text.starts_with("#Insight Transform") || has_line(text, "room_from_ct") ||
-      has_line(text, "diffdrr_parameterization") || is_sixteen_numbers(text) ||
-      is_autoscoper({path, text}))
+  if (text.starts_with("#Insight Transform") || has_line(text, "room_from_ct"))
     return inspect_pose(path, inspection);
   if (path.extension() == ".csv") return inspect_csv(path, inspection);
+  refuse_foreign(path, text);
   throw not_recognised(path);
 }
 
-/// Files of camera formats other than rig.toml, whose studies and rigs inspect_text() tells apart.
-bool states_cameras(const fs::path& path) {
-  const CameraFormat* const format = recognised_camera_format(CameraFile::open(path));
-  return format != nullptr && std::string_view(format->name) != "rig";
-}
-
+/// DICOM images have other marks than registrations.
 void inspect_file(const fs::path& path,
                   const CtReadOptions& options,
                   const Communicator& communicator,
                   Inspection& inspection) {
   if (first_bytes(path, kHdf5Mark.size()) == kHdf5Mark) {
-    if (is_small_file(path) && holds_itk_hdf5_transform(read_pose_bytes(path)))
-      return inspect_pose(path, inspection);
-    if (states_cameras(path)) return inspect_camera_file(path, inspection);
+    refuse_foreign(path, first_bytes(path, kMarkedBytes));
     return inspect_field(path, communicator, inspection);
   }
-  if (is_small_file(path) && holds_dicom_registration(read_pose_bytes(path)))
-    return inspect_pose(path, inspection);
-  if (sniff_image_format(path)) return inspect_image(path, options, inspection);
-  if (states_cameras(path)) return inspect_camera_file(path, inspection);
+  const auto format = sniff_image_format(path);
+  if (format == ImageFormat::Dicom) refuse_foreign(path, first_bytes(path, kMarkedBytes));
+  if (format) return inspect_image(path, options, inspection);
   inspect_text(path, options, inspection);
 }
 

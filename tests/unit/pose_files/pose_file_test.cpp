@@ -43,11 +43,11 @@ class PoseFile : public testing::Test {
   }
   std::vector<RigidTransform> read_csv(const std::string& text, const PoseFrame& frame = {}) {
     test::write_input(folder_ / "p.csv", text);
-    return read_poses(folder_ / "p.csv", {frame, {}, {}, {}});
+    return read_poses(folder_ / "p.csv", {frame, {}});
   }
   std::vector<std::string> notes_of(const std::string& name, const std::string& text) {
     test::write_input(folder_ / name, text);
-    return read_pose_file(folder_ / name, {PoseFrame{}, {}, {}, {}}).notes;
+    return read_pose_file(folder_ / name, {PoseFrame{}, {}}).notes;
   }
   [[nodiscard]] std::string path(const std::string& name) const { return folder_ / name; }
 
@@ -92,9 +92,14 @@ TEST_F(PoseFile, ResultJsonIsRead) {
   EXPECT_EQ(read("result.json", json_text(pose_)).matrix(), pose_.matrix());
 }
 
-TEST_F(PoseFile, SixteenPlainNumbersAreRowsOfRoomFromCt) {
-  EXPECT_EQ(read("p.txt", rows_text(pose_, " ")).matrix(), pose_.matrix());
-  EXPECT_EQ(read("p.txt", "# rows\n" + rows_text(pose_, ", ")).matrix(), pose_.matrix());
+TEST_F(PoseFile, FilesOfOtherProgramsAreRefusedWithTheCommandThatConvertsThem) {
+  test::write_input(path("p.txt"), rows_text(pose_, " "));
+  EXPECT_THAT(message_of<InputError>([&] {
+                read_pose(path("p.txt"), {{}, "--study s.toml --case a"});
+              }),
+              HasSubstr("af-convert " + path("p.txt") + " --study s.toml --case a -o poses.csv"));
+  EXPECT_THAT(refusal<InputError>("p.toml", "diffdrr_parameterization = \"quaternion\"\n"),
+              HasSubstr("af-convert"));
 }
 
 TEST_F(PoseFile, ItkTransformHoldsCtFromRoom) {
@@ -168,18 +173,14 @@ TEST_F(PoseFile, ItkTransformsThatAreNotOnePlainRigidOneAreRefused) {
 TEST_F(PoseFile, PosesThatAreNotRigidAreRefusedWithFile) {
   RigidTransform scaled = pose_;
   scaled.linear() *= 1.01;
-  for (const auto& [name, text] :
-       std::vector<std::pair<std::string, std::string>>{{"p.toml", pose_to_toml(scaled)},
-                                                        {"p.json", json_text(scaled)},
-                                                        {"p.txt", rows_text(scaled, " ")}})
+  for (const auto& [name, text] : std::vector<std::pair<std::string, std::string>>{
+           {"p.toml", pose_to_toml(scaled)}, {"p.json", json_text(scaled)}})
     EXPECT_THAT(refusal<InputError>(name, text),
                 AllOf(HasSubstr(path(name)), HasSubstr("not rigid")));
 }
 
 TEST_F(PoseFile, MalformedFilesAreRefused) {
   EXPECT_THAT(refusal<FileError>("p.txt", ""), HasSubstr("is empty"));
-  EXPECT_THAT(refusal<FileError>("p.txt", "1 2 3"), HasSubstr("16 numbers"));
-  EXPECT_THAT(refusal<FileError>("p.txt", "1 0 0 x"), HasSubstr("'x'"));
   EXPECT_THAT(refusal<FileError>("p.json", "{\"room_from_ct\": [["), HasSubstr("is not JSON"));
   EXPECT_THAT(refusal<InputError>("p.json", "{}"), HasSubstr("room_from_ct"));
   EXPECT_THAT(refusal<InputError>("p.json", "{\"room_from_ct\": [1, 2]}"),
@@ -201,10 +202,8 @@ TEST_F(PoseFile, DeeplyNestedJsonIsRefused) {
 }
 
 TEST_F(PoseFile, DamagedFilesAreReadOrRefused) {
-  for (const std::string& good : {pose_to_toml(pose_),
-                                  json_text(pose_),
-                                  rows_text(pose_, " "),
-                                  pose_to_itk_transform(pose_)}) {
+  for (const std::string& good :
+       {pose_to_toml(pose_), json_text(pose_), pose_to_itk_transform(pose_)}) {
     const std::size_t refused = test::refused_damaged_copies(
         good, 5, 200, [&](const std::string& text) { read("p.any", text); });
     EXPECT_GT(refused, 50U);
@@ -258,7 +257,6 @@ TEST_F(PoseFile, WhatIsNotReadIsNamed) {
 
 TEST_F(PoseFile, AByteOrderMarkIsNoPartOfTheText) {
   const std::string mark = "\xEF\xBB\xBF";
-  EXPECT_EQ(read("p.txt", mark + rows_text(pose_, " ")).matrix(), pose_.matrix());
   EXPECT_EQ(read("p.tfm", mark + pose_to_itk_transform(pose_)).matrix(),
             read("p.tfm", pose_to_itk_transform(pose_)).matrix());
   EXPECT_EQ(read("p.toml", mark + pose_to_toml(pose_)).matrix(), pose_.matrix());

@@ -77,6 +77,37 @@ TEST_P(BuiltinRig, IsReadWithoutWarningsAndCentresTheIsocentre) {
   }
 }
 
+TEST_F(RigFile, MatricesThatStateEverythingAreARig) {
+  // K (R | t) with K of focal length 1000 and (255.5, 199.5), R = (e_x, -e_z, e_y), t = (0, 0,
+  // 800).
+  const std::string stated =
+      "# isocenter_point 0 0 0\n# camera AP\n# size_px 512 400\n# pixel_spacing_mm 0.5 0.5\n";
+  for (const char* rows :
+       {"1000 255.5 0 204400\n0 199.5 -1000 159600\n0 1 0 800\n",
+        "-1000,-255.5,0,-204400,0,-199.5,1000,-159600,0,-1,0,-800\n",
+        "[[2000, 511, 0, 408800],\r\n[0, 399, -2000, 319200],\r\n[0, 2, 0, 1600]]\r\n"}) {
+    test::write_input(folder() / "matrices.txt", stated + rows);
+    const CameraRig rig = read_rig(folder() / "matrices.txt");
+    EXPECT_EQ(rig.cameras.front().name, "AP");
+    EXPECT_LT((rig.cameras.front().source_point - Vector3d(0, -800, 0)).norm(), 1e-9);
+    EXPECT_LT((rig.cameras.front().project({10, 20, 30}) -
+               Vector2d(255.5 + 1000.0 * 10 / 820, 199.5 - 1000.0 * 30 / 820))
+                  .norm(),
+              kPixelTolerance);
+  }
+}
+
+TEST_F(RigFile, FilesOfOtherProgramsAreRefusedWithTheCommandThatConvertsThem) {
+  const std::string cameras = folder() / "cam.txt";
+  for (const char* text : {"image size\n64,48\n", "1 0 0 5\n0 1 0 6\n0 0 1 7\n", "prose"}) {
+    test::write_input(cameras, text);
+    EXPECT_THAT(message_of<InputError>([&] { (void)read_rig(cameras); }),
+                HasSubstr("af-convert " + cameras + " -o rig.toml"));
+  }
+  EXPECT_THAT(message_of<InputError>([&] { (void)read_rig(cameras + "," + cameras); }),
+              HasSubstr("af-convert " + cameras + " " + cameras + " -o rig.toml"));
+}
+
 TEST_P(BuiltinRig, CamerasAreOrthogonal) {
   const CameraRig rig = read_rig(GetParam());
   ASSERT_EQ(rig.cameras.size(), 2U);
@@ -296,7 +327,7 @@ TEST_F(RigFile, WhatIsNotTomlIsAFileErrorWithItsPlace) {
   EXPECT_THAT(file_refusal(""), HasSubstr("is empty"));
   EXPECT_THAT(file_refusal(" \n\n"), HasSubstr("is empty"));
   EXPECT_THAT(file_refusal(std::string("\x89PNG\r\n\x1a\n\0\0\0\rIHDR", 16)),
-              HasSubstr("states no camera in a known format"));
+              HasSubstr("is not valid TOML"));
   EXPECT_THROW(read_rig(folder().path().string()), FileError);
   EXPECT_THROW(read_rig(folder() / "missing.toml"), FileError);
 }

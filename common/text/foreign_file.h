@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// Files of other programs' cameras and poses, which af-convert makes rig.toml, poses and study.toml
+// of.
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "base/error.h"
+
+namespace af {
+
+/// Whether the beginning of a file has the mark of another program's cameras or poses.
+bool has_foreign_mark(std::string_view beginning);
+
+/// "FILES: `what`: of another program's file makes it: af-convert FILES OPTIONS -o OUTPUT".
+InputError needs_conversion(std::span<const std::filesystem::path> files,
+                            const std::string& what,
+                            const std::string& options,
+                            const std::string& output);
+
+/// af-convert's options for the poses of a study's case.
+std::string conversion_options(const std::filesystem::path& study, const std::string& case_name);
+
+}  // namespace af

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every format of cameras and poses: one table each, told apart by content. docs/cameras.md and docs/poses.md describe them."""
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from . import (autoscoper, diffdrr, dicom_camera, elastix, itk, matrices, mayacam, opencv, own_poses, plastimatch, rad,
+               registration, rig_toml, rtk, xreg)
+from .errors import FileError, InputError
+from .rig import Rig, completed_rig, require
+from .source import Source
+
+
+@dataclass(frozen=True)
+class Format:
+    name: str
+    help: str
+    is_this: Callable  # (source) -> bool
+    read: Callable  # cameras: (source, options) -> StatedRig; poses: (source, context) -> [(number from 1, 4x4)], notes
+    write: Callable = None  # cameras: (rig); poses: (poses, context) -> text or bytes
+    holds_one: bool = True  # camera per file, or pose
+    states_distortion: bool = False
+
+
+CAMERAS = (
+    Format("rig", "this project's rig.toml", rig_toml.is_rig_toml, rig_toml.read_rig_toml, rig_toml.write_rig_toml, False, True),
+    Format("mayacam2", "MayaCam 2 of XMALab and Autoscoper: image size, K, R, t", mayacam.is_mayacam2, mayacam.read_mayacam2,
+           mayacam.write_mayacam2),
+    Format("mayacam1", "MayaCam 1 of the XROMM scripts and Autoscoper: five lines of three numbers", mayacam.is_mayacam1,
+           mayacam.read_mayacam1, mayacam.write_mayacam1),
+    Format("opencv", "OpenCV FileStorage YAML: camera matrix, R or rvec, t", opencv.is_opencv, opencv.read_opencv,
+           opencv.write_opencv, True, True),
+    Format("rtk", "geometry XML of RTK (IEC 61217), one camera per projection", rtk.is_rtk, rtk.read_rtk, rtk.write_rtk, False),
+    Format("plastimatch", "projection file of plastimatch drr: matrix, SAD, SID, extrinsic, intrinsic", plastimatch.is_plastimatch,
+           plastimatch.read_plastimatch, plastimatch.write_plastimatch),
+    Format("plastimatch-command", "script with a plastimatch drr command: --nrm, --vup, --sad, --sid ...",
+           plastimatch.is_plastimatch_command, plastimatch.read_plastimatch_command),
+    Format("elastix", "transform parameters of elastix with the FocalPoint of its ray-casting interpolators", elastix.is_elastix,
+           elastix.read_elastix, elastix.write_elastix),
+    Format("xreg", "HDF5 of xReg: projection data, a camera, or proj-params of DeepFluoro", xreg.is_xreg, xreg.read_xreg,
+           xreg.write_xreg, False),
+    Format("rad", ".rad text beside a raw projection (xReg): source position, TPosition", rad.is_rad, rad.read_rad, rad.write_rad),
+    Format("diffdrr", "DiffDRR's sdd, height, width, delx, dely, x0, y0 and the camera's pose, as TOML", diffdrr.is_diffdrr_camera,
+           diffdrr.read_diffdrr_camera, diffdrr.write_diffdrr_camera, False),
+    Format("dicom", "header of a DICOM XA, RF, CR or DX image: distances, positioner angles, spacing",
+           dicom_camera.is_dicom_camera, dicom_camera.read_dicom_camera),
+    Format("matrix", "3x4 projection matrices as text, pixels from room mm", matrices.is_matrix_text, matrices.read_matrix_text,
+           matrices.write_matrix_text, False),
+)
+POSES = (
+    Format("itk-hdf5", "ITK transform in HDF5 (xReg): ct_from_room, LPS, mm", itk.is_itk_hdf5, itk.read_itk_hdf5,
+           itk.write_itk_hdf5),
+    Format("dicom", "DICOM spatial registration: room_from_ct, LPS, mm", registration.is_registration,
+           registration.read_registration, registration.write_registration),
+    Format("itk", "ITK transform as text (.tfm, Slicer, elastix): ct_from_room, LPS, mm", itk.is_itk_text, itk.read_itk_text,
+           itk.write_itk_text),
+    Format("json", "result.json: room_from_ct", own_poses.is_json, own_poses.read_json),
+    Format("diffdrr", "DiffDRR's rotation and translation of one camera, RAS about the CT's middle", diffdrr.is_diffdrr_pose,
+           diffdrr.read_diffdrr_pose, diffdrr.write_diffdrr_pose, False),
+    Format("toml", "TOML: room_from_ct, 4x4", own_poses.is_toml, own_poses.read_toml, own_poses.write_toml),
+    Format("csv", "table of poses: m00 ... m23 of room_from_ct, or rx_deg ... tz_mm from nominal", own_poses.is_csv,
+           own_poses.read_csv, own_poses.write_csv, False),
+    Format("autoscoper", "Autoscoper .tra: a line of 16 numbers per frame, room from the CT's voxel frame",
+           autoscoper.is_autoscoper, autoscoper.read_autoscoper, autoscoper.write_autoscoper, False),
+    Format("matrix", "plain text: the 16 numbers of room_from_ct, row by row", own_poses.is_plain, own_poses.read_plain,
+           own_poses.write_plain),
+)
+
+
+def written(formats):
+    return [one.name for one in formats if one.write is not None]
+
+
+def recognised(source, formats, name=None):
+    """The format of a file's content, or None; with `name` the one of that name that fits it, else the only one."""
+    named = [one for one in formats if one.name == name] if name else list(formats)
+    found = next((one for one in named if one.is_this(source)), None)
+    return named[0] if found is None and name and len(named) == 1 else found
+
+
+def read_rig(paths, options, name=None):
+    """Joins the cameras of several files, each of any format, into one rig; and warnings."""
+    stated = []
+    for path in paths:
+        source = Source(path)
+        found = recognised(source, CAMERAS, name)
+        if found is None:
+            raise FileError(f"{path}: states no camera in a known format; tried: " + ", ".join(one.name for one in CAMERAS))
+        stated.append(found.read(source, options))
+    return completed_rig(stated, options)
+
+
+def rig_files(rig, name, path):
+    """[(path, text or bytes)]: one file, or, when the format holds one camera per file and the rig has several, one per camera,
+    with the camera's name before the extension."""
+    found = next(one for one in CAMERAS if one.name == name)
+    for camera in rig.cameras:
+        require(found.states_distortion or not camera.distortion.any(),
+                f"--to = {name}: cannot state the distortion of camera '{camera.name}'; those that can: " +
+                ", ".join(one.name for one in CAMERAS if one.states_distortion))
+    if not found.holds_one or len(rig.cameras) == 1:
+        return [(path, found.write(rig))]
+    return [(path.with_name(f"{path.stem}-{camera.name}{path.suffix}"), found.write(Rig(rig.isocenter_point, [camera])))
+            for camera in rig.cameras]
+
+
+def read_poses(path, context, name=None):
+    source = Source(path)
+    found = recognised(source, POSES, name)
+    if found is None:
+        raise FileError(f"{path}: holds no pose of a known format (" + ", ".join(one.name for one in POSES) + ")")
+    poses, notes = found.read(source, context)
+    if not poses:
+        raise InputError(f"{path}: holds no pose")
+    return poses, notes
+
+
+def pose_file(poses, name, context):
+    """The text or bytes of a file of [(number, 4x4)]."""
+    found = next(one for one in POSES if one.name == name)
+    numbers, matrices_ = [number for number, _ in poses], [pose for _, pose in poses]
+    require(not found.holds_one or len(poses) == 1, f"number of poses = {len(poses)}: must be 1 for the format {name}")
+    return found.write(matrices_, context, numbers) if name == "csv" else found.write(matrices_, context)
