@@ -13,8 +13,8 @@
 #include <hdf5.h>
 
 #include "field_file/dataset_rule.h"
-#include "field_file/index_chunks.h"
 #include "field_file/hdf5_handles.h"
+#include "field_file/index_chunks.h"
 
 namespace af::hdf5 {
 
