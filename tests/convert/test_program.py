@@ -25,10 +25,12 @@ def mha(grid):
 
 
 class Program(FileTest):
-    def run_program(self, *arguments):
+    def run_of(self, *command):
         environment = os.environ | {"PATH": f"{PROGRAMS}:{os.environ['PATH']}"}
-        return subprocess.run([sys.executable, "-B", PROGRAM, *map(str, arguments)], cwd=self.folder, capture_output=True, text=True,
-                              env=environment, check=False)
+        return subprocess.run([*map(str, command)], cwd=self.folder, capture_output=True, text=True, env=environment, check=False)
+
+    def run_program(self, *arguments):
+        return self.run_of(sys.executable, "-B", PROGRAM, *arguments)
 
     def convert(self, *arguments):
         run = self.run_program(*arguments)
@@ -82,6 +84,11 @@ class Cameras(Program):
     def test_help_is_there_as_pages(self):
         for kind, part in (("man", ".SH OPTIONS"), ("bash", "complete -o default"), ("zsh", "_arguments"), ("markdown", "| `--to` |")):
             self.assertIn(part, self.convert("--help-as", kind).stdout)
+
+    @unittest.skipUnless(PROGRAMS, "AF_PROGRAMS names no programs")
+    def test_programs_in_python_are_of_the_same_version(self):
+        inspect, *others = (self.run_of(PROGRAMS + "/" + name, "--version").stdout.split() for name in ("af-inspect", "af-convert", "af-report"))
+        self.assertEqual(others, [["af-convert", *inspect[1:]], ["af-report", *inspect[1:]]])
 
 
 @unittest.skipUnless(PROGRAMS, "AF_PROGRAMS names no programs")

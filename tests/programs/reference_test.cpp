@@ -129,7 +129,8 @@ TEST(Reference, OfEveryProgramIsWhatItPrints) {
                            "af-register",
                            "af-evaluate",
                            "af-inspect",
-                           "af-convert"}) {
+                           "af-convert",
+                           "af-report"}) {
     const test::ProgramRun run =
         test::run_command(std::string(AF_PROGRAM_FOLDER "/") + name + " --help-as markdown");
     ASSERT_EQ(run.exit_code, 0) << run.output;

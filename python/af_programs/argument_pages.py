@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A program's argparse options as other pages: --help-as markdown, man, bash, zsh, like those of the C++ programs."""
+"""Options of every program: --version, and --help-as markdown, man, bash, zsh, its options as other pages."""
 import argparse
 import re
+
+VERSION = "0.1.0"
 
 
 class HelpAs(argparse.Action):
@@ -12,7 +14,8 @@ class HelpAs(argparse.Action):
         parser.exit()
 
 
-def add_help_as(parser):
+def add_common_options(parser):
+    parser.add_argument("--version", action="version", version=f"{parser.prog} {VERSION}", help="print the version and exit")
     parser.add_argument("--help-as", choices=list(PAGES), action=HelpAs, metavar="KIND", help="print this help as a page of Markdown, a "
                         "manual page, or a completion for a shell, and exit: " + ", ".join(PAGES))
 
@@ -34,7 +37,8 @@ def _markdown(parser):
         text += f"\n**{title[:1].upper()}{title[1:]}**\n\n| Option | Value | What it does |\n|---|---|---|\n"
         for names, value, help_text, _ in entries:
             shown = ", ".join(f"`{name}`" for name in names) or f"`{value}`"
-            text += f"| {shown} | {f'`{value}`' if names and value else ''} | {help_text} |\n"
+            shown_help = help_text.replace("|", "&#124;")
+            text += f"| {shown} | {f'`{value}`' if names and value else ''} | {shown_help} |\n"
     return text
 
 
