@@ -19,7 +19,7 @@ af_add_test(
   SOURCES unit/simulation/af_simulate_test.cpp
   LIBS af_simulation af_gold_standard af_study_contents
   TIMEOUT 300)
-target_compile_definitions(af_simulate_test PRIVATE AF_SIMULATE_PROGRAM="$<TARGET_FILE:af-simulate>")
+target_compile_definitions(af_simulate_test PRIVATE AF_PROGRAM_FOLDER="${PROJECT_BINARY_DIR}/bin")
 add_dependencies(af_simulate_test af-simulate)
 af_add_test(
   simulated_scan_test

@@ -22,7 +22,6 @@
 
 #include "base/error.h"
 #include "image_files/itk_image_io.h"
-#include "study/pose_context.h"
 #include "support/io_checks.h"
 #include "support/test_paths.h"
 #include "unit/image_files/ct_test_data.h"
@@ -1240,9 +1239,7 @@ TEST(CtReader, GivesTheFrameOfReferenceOfTheSeriesThatIsRead) {
   report.write(folder / "ct/0.dcm");
   test::write_input(folder / "ct/1.dcm", "");
   CtReadOptions options;
-  const auto frame_of = [&](const fs::path& path) {
-    return pose_context(path, options, std::nullopt, std::nullopt).ct_frame_of_reference();
-  };
+  const auto frame_of = [&](const fs::path& path) { return ct_frame_of_reference(path, options); };
   EXPECT_THAT(test::message_of<InputError>([&] { frame_of(folder / "ct"); }), HasSubstr("1.2.2"));
   options.series_uid = "1.2.2";
   EXPECT_EQ(frame_of(folder / "ct"), "5.2");

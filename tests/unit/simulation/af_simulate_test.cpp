@@ -9,7 +9,6 @@
 
 #include <gtest/gtest.h>
 
-#include "camera_files/camera_formats.h"
 #include "files/output_file.h"
 #include "gold_standard/fiducial_registration.h"
 #include "image_files/ct_reader.h"
@@ -32,9 +31,9 @@ const std::string coarse = "--phantom spine --phantom-voxel-mm 4 ";
 class AfSimulate : public ::testing::Test {
  protected:
   /// Exit code of the program; its messages go to a file.
-  int run(const std::string& arguments) {
-    const std::string command = std::string(AF_SIMULATE_PROGRAM) + " " + arguments + " > '" +
-                                log_path().string() + "' 2>&1";
+  int run(const std::string& arguments, const std::string& program = "af-simulate") {
+    const std::string command =
+        AF_PROGRAM_FOLDER "/" + program + " " + arguments + " > '" + log_path().string() + "' 2>&1";
     const int status = std::system(command.c_str());
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   }
@@ -326,8 +325,10 @@ TEST_F(AfSimulate, DicomXaStatesTheCameraThatTookIt) {
   const Study study = read_study(scratch_ / "dicom" / "study.toml");
   const StudyCase& study_case = study.cases[0];
   for (std::size_t i = 0; i < 2; ++i) {
-    const CameraGeometry of_header =
-        read_camera_files({study_case.views[i].xray}, {}, nullptr).cameras.front();
+    const fs::path rig = scratch_ / "of-header.toml";
+    const std::string xray = study_case.views[i].xray.string();
+    ASSERT_EQ(run("'" + xray + "' -o '" + rig.string() + "'", "af-convert"), 0) << log();
+    const CameraGeometry of_header = read_rig(rig.string()).cameras.front();
     for (const Eigen::Vector3d& from_center :
          {Eigen::Vector3d(20.0, -10.0, 30.0), Eigen::Vector3d(-5.0, 40.0, -25.0)}) {
       const Eigen::Vector3d in_room =
