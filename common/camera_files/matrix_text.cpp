@@ -2,6 +2,7 @@
 #include "camera_files/matrix_text.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <vector>
 
@@ -44,13 +45,14 @@ bool is_comment(const std::vector<std::string>& words) {
   return words.front().starts_with('#');
 }
 
-/// "[a, b]" of words from `first` on; empty when one is no number.
+/// "[a, b]" of words from `first` on; empty when one is no number. Infinite ones are the reader's
+/// to refuse, by the name of their key.
 std::string list_of(const std::vector<std::string>& words, std::size_t first, std::size_t count) {
   std::string list;
   for (std::size_t i = first; i < first + count; ++i) {
     const auto number = i < words.size() ? parsed_number(words[i]) : std::nullopt;
     if (!number) return "";
-    list += (list.empty() ? "[" : ", ") + toml_number(*number);
+    list += (list.empty() ? "[" : ", ") + (std::isfinite(*number) ? toml_number(*number) : "nan");
   }
   return list + "]";
 }
