@@ -59,16 +59,20 @@ class OutputLocks : public testing::Test {
            " --camera AP --translation-mm=" + std::to_string(offset_mm) + ",0,0 -o " + path(file);
   }
 
-  /// Starts a job and holds it once `sign` is there; runs another meanwhile, which is refused; then
-  /// lets the first end.
+  /// Starts a job and holds it once its lock says who it is; runs another meanwhile, which is
+  /// refused; then lets the first end.
   void expect_second_is_refused(const std::string& first_arguments,
                                 const std::string& second_arguments,
-                                const std::string& sign) {
+                                const std::string& lock) {
     std::vector<std::string> words;
     std::istringstream rest(line(first_arguments));
     for (std::string word; rest >> word;) words.push_back(word);
     test::LaunchedJob first(words, folder_ / "said.txt");
-    ASSERT_TRUE(first.wait_until([&] { return std::filesystem::exists(path(sign)); }));
+    std::error_code none_yet;
+    ASSERT_TRUE(first.wait_until([&] {
+      const auto bytes = std::filesystem::file_size(path(lock), none_yet);
+      return !none_yet && bytes > 0;
+    }));
     kill(first.launcher(), SIGSTOP);
     const test::ProgramRun second = test::run_command(line(second_arguments));
     kill(first.launcher(), SIGCONT);
