@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "evaluate/statistics/bootstrap.h"
-#include "evaluate/statistics/statistics.h"
 #include "evaluate/statistics/success_rate.h"
 
 namespace af::evaluation {
@@ -37,14 +36,6 @@ struct PatientOutcomes {
 /// "odd" (the half to tune on), "even" (the half to judge on) or "real".
 std::string half_of(const PatientOutcomes& patient);
 
-/// A mean over patients with both kinds of 95 % intervals.
-struct OverPatients {
-  double value = 0.0;
-  /// Interval of the mean of the patients' own values, equally weighted; NaN where they are equal.
-  MeanInterval student;
-  CaseBootstrap bootstrap;  ///< by resampling of patients
-};
-
 /// One patient's success.
 struct PatientSuccess {
   std::string patient;
@@ -66,8 +57,8 @@ struct PopulationSuccess {
   /// narrow where few patients lose many.
   std::int64_t patients_with_failures = 0;
   ProportionInterval share_with_failures;  ///< Wilson's, of such patients
-  OverPatients rate;        ///< of all starts; every patient has its own number of them
-  OverPatients capture_mm;  ///< mean of the patients' own capture ranges
+  MeanOverCases rate;        ///< of all starts; every patient has its own number of them
+  MeanOverCases capture_mm;  ///< mean of the patients' own capture ranges
   std::int64_t capture_lower_bounds = 0;   ///< patients whose range is at least the whole study's
   CaptureRange pooled;                     ///< of all starts together
   CaseBootstrap pooled_interval_mm;        ///< of the pooled range, by resampling of patients

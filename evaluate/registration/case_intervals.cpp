@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluate/registration/case_intervals.h"
 
-#include <span>
-
-#include "evaluate/statistics/statistics.h"
 #include "text/number_json.h"
 
 namespace af::evaluation {
@@ -38,23 +35,10 @@ json bootstrap_json(const CaseBootstrap& bootstrap) {
 }
 
 json interval_over_cases(const std::vector<CaseMean>& cases, std::uint64_t seed) {
-  json result = bootstrap_json(bootstrap_over_cases(
-      cases.size(),
-      [&](std::span<const std::size_t> drawn) {
-        CaseMean all;
-        for (const std::size_t index : drawn) {
-          all.sum += cases[index].sum;
-          all.count += cases[index].count;
-        }
-        return all.sum / all.count;
-      },
-      seed));
-  std::vector<double> means;
-  for (const CaseMean& mean : cases)
-    if (mean.count > 0.0) means.push_back(mean.sum / mean.count);
-  const MeanInterval student = student_interval(means);
-  result["student_low"] = number_json(student.low);
-  result["student_high"] = number_json(student.high);
+  const MeanOverCases mean = mean_over_cases(cases, seed);
+  json result = bootstrap_json(mean.bootstrap);
+  result["student_low"] = number_json(mean.student.low);
+  result["student_high"] = number_json(mean.student.high);
   return result;
 }
 

@@ -20,12 +20,6 @@ nlohmann::json interval_json(const IntervalSuccess& interval);
 /// {cases, replicates, undefined, low, high, is_optimistic}.
 nlohmann::json bootstrap_json(const CaseBootstrap& bootstrap);
 
-/// A mean over one case, as a sum and the number of its terms.
-struct CaseMean {
-  double sum = 0.0;
-  double count = 0.0;
-};
-
 /// Intervals by bootstrap over cases, and Student's interval of the cases' own means, in which
 /// every case has the same weight: the above and {student_low, student_high}.
 nlohmann::json interval_over_cases(const std::vector<CaseMean>& cases, std::uint64_t seed);

@@ -31,34 +31,34 @@ constexpr std::array<const char*, 5> kErrorNames = {"mrpd_mm",
                                                     "rotation_error_deg",
                                                     "translation_error_mm"};
 
-/// Mean, SD and standard error of the signed final error of each parameter over right ends: how far
+template <typename Value>
+std::vector<double> values_of(const RowPointers& rows, const Value& value) {
+  std::vector<double> values;
+  values.reserve(rows.size());
+  for (const RegistrationRow* row : rows) values.push_back(static_cast<double>(value(*row)));
+  return values;
+}
+
+template <typename Value>
+std::vector<double> finite_values_of(const RowPointers& rows, const Value& value) {
+  std::vector<double> values = values_of(rows, value);
+  std::erase_if(values, [](double each) { return !std::isfinite(each); });
+  return values;
+}
+
+/// Mean, SD and standard error of the signed final error of each parameter: over right ends, how
 /// far the optimum itself lies from the gold pose.
-json bias_json(const RowPointers& rows, double success_tre_mm) {
+json bias_json(const RowPointers& right) {
   json result = json::object();
   for (std::size_t i = 0; i < kParameterNames.size(); ++i) {
-    std::vector<double> values;
-    for (const RegistrationRow* row : rows)
-      if (row->is_right(success_tre_mm) && std::isfinite(row->final_deg_mm[i]))
-        values.push_back(row->final_deg_mm[i]);
+    const std::vector<double> values =
+        finite_values_of(right, [&](const RegistrationRow& row) { return row.final_deg_mm[i]; });
     const SampleSummary summary = summarize(values);
     result[kParameterNames[i]] = {
         {"mean", number_json(summary.mean)},
         {"sd", number_json(summary.standard_deviation)},
         {"standard_error",
          number_json(summary.standard_deviation / std::sqrt(static_cast<double>(values.size())))}};
-  }
-  return result;
-}
-
-/// The errors beside TRE, over right ends.
-json errors_json(const RowPointers& rows, double success_tre_mm) {
-  json result = json::object();
-  for (std::size_t i = 0; i < kErrorNames.size(); ++i) {
-    std::vector<double> values;
-    for (const RegistrationRow* row : rows)
-      if (row->is_right(success_tre_mm) && std::isfinite(row->errors.values()[i]))
-        values.push_back(row->errors.values()[i]);
-    result[kErrorNames[i]] = to_json(summarize(values));
   }
   return result;
 }
@@ -73,59 +73,66 @@ json summary_of_all(std::vector<double> values) {
   return result;
 }
 
-/// The errors beside TRE, over all.
-json errors_of_all_json(const RowPointers& rows) {
+/// Of each of the errors beside TRE.
+template <typename SummaryOf>
+json errors_json(const SummaryOf& summary_of) {
   json result = json::object();
-  for (std::size_t i = 0; i < kErrorNames.size(); ++i) {
-    std::vector<double> values;
-    for (const RegistrationRow* row : rows) values.push_back(row->errors.values()[i]);
-    result[kErrorNames[i]] = summary_of_all(std::move(values));
-  }
+  for (std::size_t i = 0; i < kErrorNames.size(); ++i)
+    result[kErrorNames[i]] =
+        summary_of([i](const RegistrationRow& row) { return row.errors.values()[i]; });
   return result;
 }
 
-/// Success and TRE of some rows.
-json accuracy_of(const RowPointers& rows, const StatisticsOptions& options) {
-  std::vector<double> tre_mm;
-  std::vector<double> all_tre_mm;
-  std::vector<double> successful_tre_mm;
-  for (const RegistrationRow* row : rows) {
-    if (std::isfinite(row->tre_mm)) tre_mm.push_back(row->tre_mm);
-    all_tre_mm.push_back(row->tre_mm);
-    if (row->is_success(options.success_tre_mm)) successful_tre_mm.push_back(row->tre_mm);
-  }
-  json result = success_statistics(rows, options);
-  result["without_pose"] = rows.size() - tre_mm.size();
-  result["tre_mm"] = to_json(summarize(tre_mm));
-  result["tre_of_all_mm"] = summary_of_all(std::move(all_tre_mm));
-  result["tre_of_successes_mm"] = to_json(summarize(successful_tre_mm));
-  return result;
+/// Why a registration that did not succeed failed: "left range" (start outside, or pinned at the
+/// limit of the field or of its motion range), "budget", "numerics" (an exception, or no finite
+/// similarity), "no CT in region", "no pose given" (by another program), or "other optimum" for one
+/// that converged elsewhere.
+std::string failure_reason(const RegistrationRow& row) {
+  const std::string& stop = row.stop_reason;
+  if (stop == "pinned-at-limit" || stop == "start-inadmissible") return "left range";
+  if (stop == "evaluation-budget-spent") return "budget";
+  if (stop == "ct-outside-roi") return "no CT in region";
+  if (stop == "no-pose") return "no pose given";
+  if (stop == "error" || stop == "non-finite-similarity" || !std::isfinite(row.tre_mm))
+    return "numerics";
+  return "other optimum";
 }
 
 /// Success, TRE, other errors, reasons and times of some rows.
 json statistics_of(const RowPointers& rows, const StatisticsOptions& options) {
-  json result = accuracy_of(rows, options);
-  result["bias"] = bias_json(rows, options.success_tre_mm);
-  result["errors_of_successes"] = errors_json(rows, options.success_tre_mm);
-  result["errors_of_all"] = errors_of_all_json(rows);
-  std::vector<double> seconds;
-  std::vector<double> evaluations;
-  std::vector<double> drr_counts;
+  const auto tre_mm = [](const RegistrationRow& row) { return row.tre_mm; };
+  RowPointers successful;
+  RowPointers right;
   std::map<std::string, int> stop_reasons;
   std::map<std::string, int> failures;
   for (const RegistrationRow* row : rows) {
-    // Other programs need not state this.
-    if (std::isfinite(row->seconds)) seconds.push_back(row->seconds);
-    evaluations.push_back(static_cast<double>(row->evaluations));
-    drr_counts.push_back(static_cast<double>(row->drr_count));
+    if (row->is_success(options.success_tre_mm)) successful.push_back(row);
+    if (row->is_right(options.success_tre_mm))
+      right.push_back(row);
+    else
+      ++failures[failure_reason(*row)];
     ++stop_reasons[row->stop_reason];
-    if (!row->is_right(options.success_tre_mm)) ++failures[failure_reason(*row)];
   }
+  const std::vector<double> with_pose_mm = finite_values_of(rows, tre_mm);
+  json result = success_statistics(rows, options);
+  result["without_pose"] = rows.size() - with_pose_mm.size();
+  result["tre_mm"] = to_json(summarize(with_pose_mm));
+  result["tre_of_all_mm"] = summary_of_all(values_of(rows, tre_mm));
+  result["tre_of_successes_mm"] = to_json(summarize(values_of(successful, tre_mm)));
+  result["bias"] = bias_json(right);
+  result["errors_of_successes"] = errors_json(
+      [&](const auto& error) { return to_json(summarize(finite_values_of(right, error))); });
+  result["errors_of_all"] =
+      errors_json([&](const auto& error) { return summary_of_all(values_of(rows, error)); });
   result["stop_reasons"] = stop_reasons;
   result["failures_by_reason"] = failures;
-  result["seconds"] = to_json(summarize(seconds));
-  result["evaluations"] = to_json(summarize(evaluations));
-  result["drr_count"] = to_json(summarize(drr_counts));
+  // Other programs need not state seconds.
+  result["seconds"] = to_json(
+      summarize(finite_values_of(rows, [](const RegistrationRow& row) { return row.seconds; })));
+  result["evaluations"] = to_json(
+      summarize(values_of(rows, [](const RegistrationRow& row) { return row.evaluations; })));
+  result["drr_count"] =
+      to_json(summarize(values_of(rows, [](const RegistrationRow& row) { return row.drr_count; })));
   return result;
 }
 
@@ -174,17 +181,6 @@ RowPointers repeated_rows(std::span<const RegistrationRow> rows) {
 }
 
 }  // namespace
-
-std::string failure_reason(const RegistrationRow& row) {
-  const std::string& stop = row.stop_reason;
-  if (stop == "pinned-at-limit" || stop == "start-inadmissible") return "left range";
-  if (stop == "evaluation-budget-spent") return "budget";
-  if (stop == "ct-outside-roi") return "no CT in region";
-  if (stop == "no-pose") return "no pose given";
-  if (stop == "error" || stop == "non-finite-similarity" || !std::isfinite(row.tre_mm))
-    return "numerics";
-  return "other optimum";
-}
 
 json renderer_statistics(std::span<const RegistrationRow> rows,
                          const std::string& renderer,

@@ -23,12 +23,6 @@ struct StatisticsOptions {
   double success_tre_mm = kSuccessTreMm;
 };
 
-/// Why a registration that did not succeed failed: "left range" (start outside, or pinned at the
-/// limit of the field or of its motion range), "budget", "numerics" (an exception, or no finite
-/// similarity), "no CT in region", "no pose given" (by another program), or "other optimum" for one
-/// that converged elsewhere.
-std::string failure_reason(const RegistrationRow& row);
-
 /// Counts, success (overall, per interval, per threshold; by TRE and by mRPD), gross failures,
 /// failures by reason, capture ranges, TRE over all runs (no pose counts as infinitely far) and
 /// over successes, bias, the other errors, stop reasons and times of one renderer; per case, too;

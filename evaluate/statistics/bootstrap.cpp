@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <vector>
 
 #include "base/error.h"
@@ -41,6 +42,24 @@ CaseBootstrap bootstrap_over_cases(
   result.low = quantile(values, 0.025);
   result.high = quantile(values, 0.975);
   return result;
+}
+
+MeanOverCases mean_over_cases(const std::vector<CaseMean>& cases, std::uint64_t seed) {
+  const auto mean_of = [&](std::span<const std::size_t> drawn) {
+    CaseMean all;
+    for (const std::size_t index : drawn) {
+      all.sum += cases[index].sum;
+      all.count += cases[index].count;
+    }
+    return all.sum / all.count;
+  };
+  std::vector<std::size_t> each(cases.size());
+  std::iota(each.begin(), each.end(), 0);
+  std::vector<double> means;
+  for (const CaseMean& mean : cases)
+    if (mean.count > 0.0) means.push_back(mean.sum / mean.count);
+  return {
+      mean_of(each), bootstrap_over_cases(cases.size(), mean_of, seed), student_interval(means)};
 }
 
 }  // namespace af::evaluation

@@ -5,6 +5,9 @@
 #include <cstdint>
 #include <functional>
 #include <span>
+#include <vector>
+
+#include "evaluate/statistics/statistics.h"
 
 namespace af::evaluation {
 
@@ -33,5 +36,21 @@ CaseBootstrap bootstrap_over_cases(
     const std::function<double(std::span<const std::size_t> drawn)>& statistic,
     std::uint64_t seed,
     std::size_t replicates = kBootstrapReplicates);
+
+/// A mean over one case, as a sum and the number of its terms.
+struct CaseMean {
+  double sum = 0.0;
+  double count = 0.0;
+};
+
+/// A mean over cases with both kinds of 95 % intervals.
+struct MeanOverCases {
+  double value = 0.0;       ///< of all terms together
+  CaseBootstrap bootstrap;  ///< of it
+  /// Of the mean of the cases' own means, in which every case has the same weight.
+  MeanInterval student;
+};
+
+MeanOverCases mean_over_cases(const std::vector<CaseMean>& cases, std::uint64_t seed);
 
 }  // namespace af::evaluation
