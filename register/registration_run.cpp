@@ -19,8 +19,8 @@
 #include "gold_standard/tre.h"
 #include "parallel/work_watch.h"
 #include "pose_files/pose_file.h"
+#include "register/results/registration_results.h"
 #include "register/results/slicer_folder.h"
-#include "register/verdict/view_diagnosis.h"
 #include "run/run_folder.h"
 #include "run/terminal.h"
 #include "study/case_gold_standard.h"
@@ -182,9 +182,7 @@ void write_results(const RegisterOptions& options,
                    RunFolder& folder) {
   add_target_errors(registered, records);
   RegistrationRecord& best = records[best_record(records)];
-  if (!best.view_values.empty() && best.result.evaluations > 0)
-    best.diagnosis = diagnose_views(
-        problem, best.result.start_room_from_ct, best.result.room_from_ct, best.view_values);
+  diagnose(problem, best);
   warn_of(best.diagnosis.messages, world);
   warn_of_clipped(records, world);
   const bool is_found = judgement_of(best).verdict != Verdict::NotFound;
@@ -230,12 +228,9 @@ void run_registration(const RegisterOptions& options,
   const auto pool = std::make_shared<ThreadPool>(thread_count(options.method.threads));
   const LoadedCase loaded = load_problem(options, method, registered, pool, world);
   const auto& problem = loaded.problem;
-  RegistrationRunner runner =
-      all_or_none(world, [&] { return RegistrationRunner(problem, method, pool); });
-  PoseExaminer examiner =
-      all_or_none(world, [&] { return PoseExaminer(*problem, method.silhouette_mm()); });
-  UncertaintyEstimator estimator = all_or_none(
-      world, [&] { return UncertaintyEstimator(problem, method, options.uncertainty, pool); });
+  Registrar registrar = all_or_none(world, [&] {
+    return Registrar(problem, RegistrationRunner(problem, method, pool), options.uncertainty, pool);
+  });
   all_or_none(world, [&] {
     if (!world.is_root()) return;
     announce_outputs(options.output_folder, overlay_file_names(*problem));
@@ -248,9 +243,7 @@ void run_registration(const RegisterOptions& options,
   const RunDescription description =
       description_of(in_force, registered, loaded, command_line, world);
   std::vector<RegistrationRecord> records = register_starts(
-      runner,
-      examiner,
-      estimator,
+      registrar,
       registered.starts,
       folder.unfinished("registrations",
                         deciding_values(deciding_options(in_force), description.provenance.inputs)),
@@ -261,19 +254,12 @@ void run_registration(const RegisterOptions& options,
   });
 }
 
-std::vector<RegistrationRecord> register_starts(RegistrationRunner& runner,
-                                                PoseExaminer& examiner,
-                                                UncertaintyEstimator& estimator,
+std::vector<RegistrationRecord> register_starts(Registrar& registrar,
                                                 std::span<const RigidTransform> starts,
                                                 const UnfinishedWork& unfinished,
                                                 const Communicator& communicator) {
   const auto run = [&](std::int64_t index) {
-    RegistrationRecord record;
-    record.start_index = index;
-    record.result = runner.run(starts[static_cast<std::size_t>(index)], index);
-    record.view_values = examiner.view_values(record.result.room_from_ct, estimator.is_on());
-    record.uncertainty = estimator.report(record.result, record.view_values);
-    return record;
+    return registrar.run(starts[static_cast<std::size_t>(index)], index);
   };
   std::vector<RegistrationRecord> records;
   if (starts.empty()) return records;

@@ -8,11 +8,8 @@
 
 #include "parallel/communicator.h"
 #include "pose_files/pose_format.h"
-#include "register/method/registration.h"
 #include "register/register_options.h"
-#include "register/results/registration_results.h"
-#include "register/uncertainty/uncertainty_estimator.h"
-#include "register/verdict/pose_examiner.h"
+#include "register/uncertainty/registrar.h"
 #include "run/resumable_items.h"
 
 namespace af::registration {
@@ -31,14 +28,12 @@ void run_registration(const RegisterOptions& options,
                       const std::string& command_line,
                       const Communicator& world);
 
-/// Collective. Registers from every start and examines the ends. Ranks take starts as they become
+/// Collective. Registers from every start. Ranks take starts as they become
 /// free. With several starts, finished ones are saved (see ResumableItems), so that a stopped or
 /// killed run can resume. Rank 0 returns one record per start, in the order of starts; the others
 /// return none. Only the record of the highest similarity (ties: the lowest start index) keeps its
 /// trace, so that memory does not grow with the number of starts.
-std::vector<RegistrationRecord> register_starts(RegistrationRunner& runner,
-                                                PoseExaminer& examiner,
-                                                UncertaintyEstimator& estimator,
+std::vector<RegistrationRecord> register_starts(Registrar& registrar,
                                                 std::span<const RigidTransform> starts,
                                                 const UnfinishedWork& unfinished,
                                                 const Communicator& communicator);

@@ -15,11 +15,7 @@
 #include "register/case_loading.h"
 #include "register/method/method_options.h"
 #include "register/method/presets.h"
-#include "register/method/registration.h"
-#include "register/uncertainty/uncertainty_estimator.h"
-#include "register/verdict/pose_examiner.h"
-#include "register/verdict/verdict.h"
-#include "register/verdict/view_diagnosis.h"
+#include "register/uncertainty/registrar.h"
 #include "study/case_gold_standard.h"
 #include "study/landmark_start.h"
 #include "study/study_file.h"
@@ -120,10 +116,8 @@ struct RegistrationCase::Impl {
   std::optional<af::GoldStandard> gold;
   std::vector<Eigen::Vector3d> target_points;
   std::shared_ptr<const registration::RegistrationProblem> problem;
-  std::unique_ptr<registration::RegistrationRunner> runner;
-  std::unique_ptr<registration::PoseExaminer> examiner;
-  std::unique_ptr<registration::UncertaintyEstimator> estimator;
-  af::ForkAwareMutex mutex;  ///< of runner, examiner and estimator
+  std::unique_ptr<registration::Registrar> registrar;
+  af::ForkAwareMutex mutex;  ///< of registrar
 
   [[nodiscard]] std::optional<double> tre_mm(const af::RigidTransform& pose) const {
     if (!gold.has_value()) return std::nullopt;
@@ -132,13 +126,10 @@ struct RegistrationCase::Impl {
 
   /// `is_diagnosed`: X-rays that do not fit are looked into, as af-register does for its best end.
   Registration run(const af::RigidTransform& start, std::int64_t start_index, bool is_diagnosed) {
-    const registration::RegistrationResult result = runner->run(start, start_index);
-    const auto view_values = examiner->view_values(result.room_from_ct, estimator->is_on());
-    registration::ViewDiagnosis diagnosis;
-    if (is_diagnosed && !view_values.empty() && result.evaluations > 0)
-      diagnosis = registration::diagnose_views(
-          problem, result.start_room_from_ct, result.room_from_ct, view_values);
-    const auto judgement = registration::judgement_of(result, view_values, diagnosis);
+    registration::RegistrationRecord record = registrar->run(start, start_index);
+    if (is_diagnosed) registration::diagnose(problem, record);
+    const registration::RegistrationResult& result = record.result;
+    const auto judgement = registration::judgement_of(record);
     Registration found;
     found.start_index = start_index;
     found.start = library::pose_of(result.start_room_from_ct);
@@ -153,10 +144,11 @@ struct RegistrationCase::Impl {
     found.evaluations = result.evaluations;
     found.inadmissible = result.inadmissible;
     found.drr_count = result.drr_count;
-    for (std::size_t i = 0; i < view_values.size(); ++i)
-      found.views.push_back(
-          {problem->views[i].view.camera.name, view_values[i].coarse, view_values[i].fine});
-    found.uncertainty = uncertainty_of(estimator->report(result, view_values));
+    for (std::size_t i = 0; i < record.view_values.size(); ++i)
+      found.views.push_back({problem->views[i].view.camera.name,
+                             record.view_values[i].coarse,
+                             record.view_values[i].fine});
+    found.uncertainty = uncertainty_of(record.uncertainty);
     found.initial_tre_mm = tre_mm(result.start_room_from_ct);
     found.tre_mm = tre_mm(result.room_from_ct);
     found.seconds = result.seconds;
@@ -199,11 +191,11 @@ RegistrationCase RegistrationCase::load(const std::filesystem::path& study_path,
         registration::load_case(study, study_case, loading, af::Communicator::alone());
     impl->warnings.insert(impl->warnings.end(), loaded.warnings.begin(), loaded.warnings.end());
     impl->problem = loaded.problem;
-    impl->runner = std::make_unique<registration::RegistrationRunner>(loaded.problem, method, pool);
-    impl->examiner =
-        std::make_unique<registration::PoseExaminer>(*loaded.problem, method.silhouette_mm());
-    impl->estimator = std::make_unique<registration::UncertaintyEstimator>(
-        loaded.problem, method, uncertainty_options(options), pool);
+    impl->registrar = std::make_unique<registration::Registrar>(
+        loaded.problem,
+        registration::RegistrationRunner(loaded.problem, method, pool),
+        uncertainty_options(options),
+        pool);
     return RegistrationCase(std::move(impl));
   });
 }
@@ -279,7 +271,8 @@ std::optional<double> RegistrationCase::similarity(const Pose& pose) const {
   return library::translated([&]() -> std::optional<double> {
     const af::RigidTransform room_from_ct = library::transform_of(pose, "pose");
     const std::lock_guard turn(impl_->mutex);
-    const registration::ObjectiveValue value = impl_->runner->similarity_at(room_from_ct);
+    const registration::ObjectiveValue value =
+        impl_->registrar->runner().similarity_at(room_from_ct);
     return value.is_admissible ? std::optional(value.similarity) : std::nullopt;
   });
 }

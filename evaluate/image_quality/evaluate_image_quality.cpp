@@ -17,6 +17,7 @@
 #include "evaluate/image_quality/loss_split_tables.h"
 #include "evaluate/outputs/row_gathering.h"
 #include "evaluate/outputs/sample_summary_json.h"
+#include "evaluate/report/evaluation_run.h"
 #include "evaluate/report/report_program.h"
 #include "field_use/opened_field.h"
 #include "figures/picture.h"
@@ -222,13 +223,12 @@ void write_results(const ImageQualityOptions& options,
   const std::vector<DrrComparison>& comparisons = result.comparisons;
   // From here on the results of an earlier run in this folder are incomplete.
   remove_output(folder / "summary.json");
-  write_text_file(folder / "image-quality.csv", image_quality_table(comparisons).to_text());
+  write_text_file(folder / "image-quality.csv",
+                  csv_table(image_quality_rows(comparisons)).to_text());
   json field = field_description(
       setup.field->identity(), *setup.field->coverage().planes.front(), setup.field->codewords());
   if (setup.field->atlas()) field["members"] = setup.field->coverage().planes.size();
-  json summary = {{"format", "attenuation-fields evaluation"},
-                  {"format_version", 1},
-                  {"kind", "image-quality"}};
+  json summary = summary_of_kind("image-quality");
   summary["figures"] = {"psnr"};
   summary["pictures"] = json::array();
   for (const auto& [which, share] : {std::pair("worst", 0.0), std::pair("median", 0.5)}) {
@@ -361,8 +361,10 @@ TargetResult evaluate_target(const ImageQualityOptions& options,
                    static_cast<double>(count) * static_cast<double>(sizeof(DrrComparison)));
   });
   TargetResult result{target.case_name, setup.view.camera.name, {}, {}};
-  announce_time(
-      world, "poses compared", count, [&] { std::ignore = compare(options, setup, comparer, 0); });
+  announce_time(world, "poses compared", count, [&] {
+    std::ignore = compare(options, setup, comparer, 0);
+    return 1.0;
+  });
   result.comparisons = collected_rows<DrrComparison>(
       world, unfinished("-poses"), count, "poses compared", [&](std::int64_t index) {
         return compare(options, setup, comparer, index);
@@ -411,21 +413,15 @@ std::vector<Target> targets_of(const ImageQualityOptions& options) {
 
 /// One table, box plot and sheet of pairs of all fields of a study.
 void write_together(const std::vector<TargetResult>& results, const std::filesystem::path& folder) {
-  std::vector<std::string> columns = {"case", "camera"};
-  const std::vector<std::string> own_columns = image_quality_table({}).columns();
-  columns.insert(columns.end(), own_columns.begin(), own_columns.end());
-  CsvTable table(columns);
+  std::vector<CsvCells> rows;
   std::vector<PicturePanel> panels;
   for (const TargetResult& result : results) {
-    const CsvTable own = image_quality_table(result.comparisons);
-    for (std::size_t row = 0; row < own.row_count(); ++row) {
-      std::vector<std::string> fields = {result.case_name, result.camera};
-      for (const std::string& column : own_columns) fields.push_back(own.text(row, column));
-      table.add_row(std::move(fields));
-    }
+    for (CsvCells& row : image_quality_rows(
+             result.comparisons, {{"case", result.case_name}, {"camera", result.camera}}))
+      rows.push_back(std::move(row));
     panels.insert(panels.end(), result.worst_pair.begin(), result.worst_pair.end());
   }
-  write_text_file(folder / "image-quality.csv", table.to_text());
+  write_text_file(folder / "image-quality.csv", csv_table(std::move(rows)).to_text());
   write_picture(panels,
                 3,
                 "The worst pair of every field",

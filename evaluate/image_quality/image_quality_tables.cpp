@@ -2,8 +2,8 @@
 #include "evaluate/image_quality/image_quality_tables.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <utility>
 
 #include "evaluate/outputs/sample_summary_json.h"
 #include "evaluate/statistics/statistics.h"
@@ -41,39 +41,25 @@ json share_where(const std::vector<double>& values, const auto& predicate) {
 
 }  // namespace
 
-CsvTable image_quality_table(const std::vector<DrrComparison>& comparisons) {
-  CsvTable table({"pose_index",
-                  "rx_deg",
-                  "ry_deg",
-                  "rz_deg",
-                  "tx_mm",
-                  "ty_mm",
-                  "tz_mm",
-                  "psnr_db",
-                  "rms_difference",
-                  "mean_difference",
-                  "largest_difference",
-                  "reference_maximum",
-                  "foreground_fraction",
-                  "rays_outside",
-                  "redrawn"});
-  for (std::size_t i = 0; i < comparisons.size(); ++i) {
-    const DrrComparison& comparison = comparisons[i];
-    std::vector<std::string> fields = {std::to_string(i)};
-    for (const double value : comparison.parameters.deg_and_mm())
-      fields.push_back(number_text(value));
-    for (const double value : {comparison.psnr_db,
-                               comparison.rms_difference,
-                               comparison.mean_difference,
-                               comparison.largest_difference,
-                               comparison.reference_maximum,
-                               comparison.foreground_fraction})
-      fields.push_back(number_text(value));
-    fields.push_back(std::to_string(comparison.rays_outside));
-    fields.push_back(std::to_string(comparison.redrawn));
-    table.add_row(std::move(fields));
+std::vector<CsvCells> image_quality_rows(const std::vector<DrrComparison>& comparisons,
+                                         const CsvCells& target) {
+  std::vector<CsvCells> rows;
+  for (const DrrComparison& comparison : comparisons) {
+    CsvCells cells = target;
+    cells.emplace_back("pose_index", rows.size());
+    append("", kParameterNames, comparison.parameters.deg_and_mm(), cells);
+    append({{"psnr_db", comparison.psnr_db},
+            {"rms_difference", comparison.rms_difference},
+            {"mean_difference", comparison.mean_difference},
+            {"largest_difference", comparison.largest_difference},
+            {"reference_maximum", comparison.reference_maximum},
+            {"foreground_fraction", comparison.foreground_fraction},
+            {"rays_outside", comparison.rays_outside},
+            {"redrawn", comparison.redrawn}},
+           cells);
+    rows.push_back(std::move(cells));
   }
-  return table;
+  return rows;
 }
 
 std::optional<std::size_t> comparison_at(const std::vector<DrrComparison>& comparisons,

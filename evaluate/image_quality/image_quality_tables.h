@@ -8,12 +8,13 @@
 #include "evaluate/image_quality/drr_comparison.h"
 #include "field/compressed_attenuation_field.h"
 #include "geometry/camera_distance.h"
-#include "text/csv_table.h"
+#include "text/csv_cells.h"
 
 namespace af::evaluation {
 
-/// image-quality.csv: one row per pose, in order; no timings.
-CsvTable image_quality_table(const std::vector<DrrComparison>& comparisons);
+/// image-quality.csv: one row per pose, in order, behind what names the target; no timings.
+std::vector<CsvCells> image_quality_rows(const std::vector<DrrComparison>& comparisons,
+                                         const CsvCells& target = {});
 
 /// Index of the comparison at `share` of the ascending PSNRs (0: the worst); nullopt when none was
 /// possible. Ties go to the lower index.

@@ -8,7 +8,7 @@
 
 #include "evaluate/outputs/sample_summary_json.h"
 #include "files/output_file.h"
-#include "text/csv_table.h"
+#include "text/csv_cells.h"
 
 namespace af::evaluation {
 namespace {
@@ -19,15 +19,15 @@ constexpr std::array<const char*, LossSplit::kParts> kLabels = {
     "(u,v) alone", "(s,t) alone", "(u,v) and (s,t)", "quantisation", "field"};
 
 CsvTable splits_table(const std::vector<LossSplit>& splits) {
-  std::vector<std::string> columns = {"pose_index"};
-  for (const char* name : LossSplit::kNames) columns.push_back(std::string(name) + "_psnr_db");
-  CsvTable table(std::move(columns));
-  for (std::size_t i = 0; i < splits.size(); ++i) {
-    std::vector<std::string> fields = {std::to_string(i)};
-    for (const double value : splits[i].psnr_db()) fields.push_back(number_text(value));
-    table.add_row(std::move(fields));
+  std::vector<CsvCells> rows;
+  for (const LossSplit& split : splits) {
+    CsvCells cells = {{"pose_index", rows.size()}};
+    const auto psnr_db = split.psnr_db();
+    for (std::size_t i = 0; i < LossSplit::kParts; ++i)
+      cells.emplace_back(std::string(LossSplit::kNames[i]) + "_psnr_db", psnr_db[i]);
+    rows.push_back(std::move(cells));
   }
-  return table;
+  return csv_table(std::move(rows));
 }
 
 /// Mean over the poses that could be split.

@@ -20,7 +20,7 @@
 #include "study/node_ct.h"
 #include "study/shared_inputs.h"
 #include "study/xray_reader.h"
-#include "text/csv_table.h"
+#include "text/csv_cells.h"
 
 namespace af::evaluation {
 namespace {
@@ -126,15 +126,14 @@ void judge_view(const HeldOutOptions& options,
 }
 
 CsvTable rows_table(const std::vector<HeldOutRow>& rows, double smoothing_px) {
-  CsvTable table({"case", "camera", "prediction", "psnr_db", "smoothed_psnr_db", "smoothing_px"});
-  for (const HeldOutRow& row : rows)
-    table.add_row({row.case_name,
-                   row.camera,
-                   row.predictor,
-                   number_text(row.psnr_db),
-                   number_text(row.smoothed_psnr_db),
-                   number_text(smoothing_px)});
-  return table;
+  return csv_table(rows, [&](const HeldOutRow& row) -> CsvCells {
+    return {{"case", row.case_name},
+            {"camera", row.camera},
+            {"prediction", row.predictor},
+            {"psnr_db", row.psnr_db},
+            {"smoothed_psnr_db", row.smoothed_psnr_db},
+            {"smoothing_px", smoothing_px}};
+  });
 }
 
 /// Collective. Ray casting first, then the fields under their files' names.

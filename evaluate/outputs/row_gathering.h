@@ -38,11 +38,12 @@ std::vector<Row> collected_rows(const Communicator& world,
   return rows;
 }
 
-/// Rank 0 does one item, discards the result, and says how long `count` of them will take on all
-/// ranks. When the item fails, nothing is said: the run itself will report why.
+/// Rank 0 works on a sample, which returns how many times as long an item takes, and says how long
+/// `count` items will take on all ranks. When the sample fails, nothing is said: the run itself
+/// will report why.
 void announce_time(const Communicator& world,
                    const std::string& what,
                    std::int64_t count,
-                   const std::function<void()>& item);
+                   const std::function<double()>& sample);
 
 }  // namespace af::evaluation

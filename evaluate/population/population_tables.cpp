@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "base/joined.h"
-#include "base/number_text.h"
 #include "base/sample_summary.h"
+#include "text/csv_cells.h"
 
 namespace af::evaluation {
 
@@ -37,13 +37,8 @@ PopulationGroup group_of(const PopulationCondition& condition,
   return group;
 }
 
-struct NamedCell {
-  std::string name;
-  std::string text;
-};
-
-/// What a row says of a group's success, in the order of its columns.
-std::vector<NamedCell> success_of(const PopulationSuccess& success) {
+/// What a row says of a group's success by one error.
+CsvCells success_of(const PopulationSuccess& success, const std::string& error) {
   double worst = 1.0;
   double smallest_mm = std::numeric_limits<double>::infinity();
   for (const PatientSuccess& patient : success.patients) {
@@ -51,34 +46,32 @@ std::vector<NamedCell> success_of(const PopulationSuccess& success) {
                      static_cast<double>(patient.successes) / static_cast<double>(patient.starts));
     smallest_mm = std::min(smallest_mm, patient.capture.initial_tre_mm);
   }
-  const auto number = [](double value) { return number_text(value); };
-  const auto& rate = success.rate;
-  const auto& own = success.capture_mm;
-  std::vector<NamedCell> cells = {
-      {"successes", std::to_string(success.successes)},
-      {"rate", number(rate.value)},
-      {"student_low", number(rate.student.low)},
-      {"student_high", number(rate.student.high)},
-      {"bootstrap_low", number(rate.bootstrap.low)},
-      {"bootstrap_high", number(rate.bootstrap.high)},
-      {"worst_patient_rate", number(worst)},
-      {"capture_mm", number(success.pooled.initial_tre_mm)},
-      {"capture_ended_by", to_string(success.pooled.end)},
-      {"capture_bootstrap_low_mm", number(success.pooled_interval_mm.low)},
-      {"capture_bootstrap_high_mm", number(success.pooled_interval_mm.high)},
-      {"patients_capture_mean_mm", number(own.value)},
-      {"patients_capture_student_low_mm", number(own.student.low)},
-      {"patients_capture_student_high_mm", number(own.student.high)},
-      {"patients_capture_bootstrap_low_mm", number(own.bootstrap.low)},
-      {"patients_capture_bootstrap_high_mm", number(own.bootstrap.high)},
-      {"patients_capture_smallest_mm", number(smallest_mm)},
-      {"patients_capture_lower_bounds", std::to_string(success.capture_lower_bounds)},
-      {"patients_with_failures", std::to_string(success.patients_with_failures)},
-      {"share_with_failures_low", number(success.share_with_failures.low)},
-      {"share_with_failures_high", number(success.share_with_failures.high)}};
+  const MeanOverCases& rate = success.rate;
+  const MeanOverCases& own = success.capture_mm;
+  CsvCells cells = {{error + "successes", success.successes},
+                    {error + "rate", rate.value},
+                    {error + "student_low", rate.student.low},
+                    {error + "student_high", rate.student.high},
+                    {error + "bootstrap_low", rate.bootstrap.low},
+                    {error + "bootstrap_high", rate.bootstrap.high},
+                    {error + "worst_patient_rate", worst},
+                    {error + "capture_mm", success.pooled.initial_tre_mm},
+                    {error + "capture_ended_by", to_string(success.pooled.end)},
+                    {error + "capture_bootstrap_low_mm", success.pooled_interval_mm.low},
+                    {error + "capture_bootstrap_high_mm", success.pooled_interval_mm.high},
+                    {error + "patients_capture_mean_mm", own.value},
+                    {error + "patients_capture_student_low_mm", own.student.low},
+                    {error + "patients_capture_student_high_mm", own.student.high},
+                    {error + "patients_capture_bootstrap_low_mm", own.bootstrap.low},
+                    {error + "patients_capture_bootstrap_high_mm", own.bootstrap.high},
+                    {error + "patients_capture_smallest_mm", smallest_mm},
+                    {error + "patients_capture_lower_bounds", success.capture_lower_bounds},
+                    {error + "patients_with_failures", success.patients_with_failures},
+                    {error + "share_with_failures_low", success.share_with_failures.low},
+                    {error + "share_with_failures_high", success.share_with_failures.high}};
   for (std::size_t i = 0; i < kLadderMm.size(); ++i)
-    cells.push_back(
-        {"below_" + number_text(kLadderMm[i]) + "_mm", std::to_string(success.below_ladder[i])});
+    cells.emplace_back(error + "below_" + number_text(kLadderMm[i]) + "_mm",
+                       success.below_ladder[i]);
   return cells;
 }
 
@@ -106,91 +99,62 @@ std::vector<PopulationGroup> groups_of(const PopulationCondition& condition,
 }
 
 CsvTable population_table(const std::vector<PopulationGroup>& groups, double success_mm) {
-  std::vector<std::string> columns{
-      "condition", "group", "patients", "starts", "median_tre_mm", "median_seconds"};
-  for (const char* const error : {"tre_", "mrpd_"})
-    for (const NamedCell& cell : success_of({})) columns.push_back(error + cell.name);
-  columns.emplace_back("success_mm");
-  columns.emplace_back("commit");
-  CsvTable table(columns);
-  for (const PopulationGroup& group : groups) {
-    std::vector<std::string> fields{group.condition,
-                                    group.group,
-                                    std::to_string(group.by_tre.patients.size()),
-                                    std::to_string(group.by_tre.starts),
-                                    number_text(group.median_tre_mm),
-                                    number_text(group.median_seconds)};
-    for (const PopulationSuccess* success : {&group.by_tre, &group.by_mrpd})
-      for (NamedCell& cell : success_of(*success)) fields.push_back(std::move(cell.text));
-    fields.push_back(number_text(success_mm));
-    fields.push_back(group.commits);
-    table.add_row(std::move(fields));
-  }
-  return table;
+  return csv_table(groups, [&](const PopulationGroup& group) {
+    CsvCells cells = {{"condition", group.condition},
+                      {"group", group.group},
+                      {"patients", group.by_tre.patients.size()},
+                      {"starts", group.by_tre.starts},
+                      {"median_tre_mm", group.median_tre_mm},
+                      {"median_seconds", group.median_seconds}};
+    append(success_of(group.by_tre, "tre_"), cells);
+    append(success_of(group.by_mrpd, "mrpd_"), cells);
+    append({{"success_mm", success_mm}, {"commit", group.commits}}, cells);
+    return cells;
+  });
 }
 
 CsvTable patients_table(const std::vector<PopulationGroup>& groups) {
-  CsvTable table({"condition",
-                  "patient",
-                  "starts",
-                  "tre_successes",
-                  "wilson_low",
-                  "wilson_high",
-                  "capture_mm",
-                  "capture_ended_by",
-                  "mrpd_successes",
-                  "mrpd_capture_mm",
-                  "mrpd_capture_ended_by",
-                  "commit"});
+  std::vector<CsvCells> rows;
   for (const PopulationGroup& group : groups) {
     if (group.group != "all") continue;
     for (std::size_t i = 0; i < group.by_tre.patients.size(); ++i) {
       const PatientSuccess& tre = group.by_tre.patients[i];
       const PatientSuccess& mrpd = group.by_mrpd.patients[i];
-      table.add_row({group.condition,
-                     tre.patient,
-                     std::to_string(tre.starts),
-                     std::to_string(tre.successes),
-                     number_text(tre.wilson.low),
-                     number_text(tre.wilson.high),
-                     number_text(tre.capture.initial_tre_mm),
-                     to_string(tre.capture.end),
-                     std::to_string(mrpd.successes),
-                     number_text(mrpd.capture.initial_tre_mm),
-                     to_string(mrpd.capture.end),
-                     group.commits});
+      rows.push_back({{"condition", group.condition},
+                      {"patient", tre.patient},
+                      {"starts", tre.starts},
+                      {"tre_successes", tre.successes},
+                      {"wilson_low", tre.wilson.low},
+                      {"wilson_high", tre.wilson.high},
+                      {"capture_mm", tre.capture.initial_tre_mm},
+                      {"capture_ended_by", to_string(tre.capture.end)},
+                      {"mrpd_successes", mrpd.successes},
+                      {"mrpd_capture_mm", mrpd.capture.initial_tre_mm},
+                      {"mrpd_capture_ended_by", to_string(mrpd.capture.end)},
+                      {"commit", group.commits}});
     }
   }
-  return table;
+  return csv_table(std::move(rows));
 }
 
 CsvTable intervals_table(const std::vector<PopulationGroup>& groups) {
-  CsvTable table({"condition",
-                  "error",
-                  "low_mm",
-                  "high_mm",
-                  "starts",
-                  "successes",
-                  "bootstrap_low",
-                  "bootstrap_high",
-                  "commit"});
+  std::vector<CsvCells> rows;
   for (const PopulationGroup& group : groups) {
     if (group.group != "all") continue;
-    for (const bool is_tre : {true, false}) {
-      const PopulationSuccess& success = is_tre ? group.by_tre : group.by_mrpd;
-      for (std::size_t k = 0; k < success.intervals.size(); ++k)
-        table.add_row({group.condition,
-                       is_tre ? "tre" : "mrpd",
-                       number_text(success.intervals[k].low_mm),
-                       number_text(success.intervals[k].high_mm),
-                       std::to_string(success.intervals[k].trials),
-                       std::to_string(success.intervals[k].successes),
-                       number_text(success.interval_bootstraps[k].low),
-                       number_text(success.interval_bootstraps[k].high),
-                       group.commits});
-    }
+    for (const auto& [error, success] :
+         {std::pair("tre", &group.by_tre), std::pair("mrpd", &group.by_mrpd)})
+      for (std::size_t k = 0; k < success->intervals.size(); ++k)
+        rows.push_back({{"condition", group.condition},
+                        {"error", error},
+                        {"low_mm", success->intervals[k].low_mm},
+                        {"high_mm", success->intervals[k].high_mm},
+                        {"starts", success->intervals[k].trials},
+                        {"successes", success->intervals[k].successes},
+                        {"bootstrap_low", success->interval_bootstraps[k].low},
+                        {"bootstrap_high", success->interval_bootstraps[k].high},
+                        {"commit", group.commits}});
   }
-  return table;
+  return csv_table(std::move(rows));
 }
 
 }  // namespace af::evaluation

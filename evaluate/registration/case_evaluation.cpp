@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <exception>
@@ -29,12 +28,7 @@
 #include "register/results/registration_results.h"
 #include "register/results/slicer_folder.h"
 #include "register/uncertainty/pose_covariance.h"
-#include "register/uncertainty/uncertainty_estimator.h"
-#include "register/verdict/pose_examiner.h"
-#include "run/progress_printer.h"
 #include "run/resumable_items.h"
-#include "run/stop_request.h"
-#include "run/terminal.h"
 #include "study/node_ct.h"
 #include "study_pictures/study_pictures.h"
 #include "text/foreign_file.h"
@@ -45,37 +39,25 @@ namespace {
 
 using nlohmann::json;
 using registration::PoseExaminer;
-using registration::RegistrationResult;
-using registration::RegistrationRunner;
-using registration::StopReason;
-using registration::UncertaintyEstimator;
+using registration::RegistrationRecord;
 
 /// One renderer's share of a case.
 struct Method {
   std::string renderer;
-  RegistrationRunner runner;
+  registration::Registrar registrar;
   std::vector<std::int64_t> start_indices;  ///< ascending
   double success_tre_mm = kSuccessTreMm;    ///< failures keep their traces
-  /// None when uncertainty is left out.
-  std::unique_ptr<registration::PoseExaminer> examiner;
-  std::unique_ptr<registration::UncertaintyEstimator> estimator;
-};
 
-/// Prepares the estimate of how far ends are from the truth, unless it is left out.
-void examine_ends(const std::shared_ptr<const registration::RegistrationProblem>& problem,
-                  const registration::UncertaintyOptions& options,
-                  Method& method) {
-  if (options.is_left_out) return;
-  const registration::RegistrationOptions& registered = method.runner.options();
-  method.examiner = std::make_unique<PoseExaminer>(*problem, registered.silhouette_mm());
-  method.estimator = std::make_unique<UncertaintyEstimator>(problem, registered, options);
-}
+  [[nodiscard]] const registration::RegistrationProblem& problem() const {
+    return registrar.runner().problem();
+  }
+};
 
 /// Inside the motion range of every field in use; where a field has none for this camera, all rays
 /// must be inside.
 bool is_admissible(const std::vector<Method>& methods, const RigidTransform& room_from_ct) {
   for (const Method& method : methods)
-    for (const registration::RegistrationView& view : method.runner.problem().views)
+    for (const registration::RegistrationView& view : method.problem().views)
       if (view.limit.has_value()
               ? view.limit->beyond(room_from_ct).any()
               : view.renderer->rays_outside(room_from_ct, view.widest_view()) > 0)
@@ -86,7 +68,7 @@ bool is_admissible(const std::vector<Method>& methods, const RigidTransform& roo
 /// The motion range of the first field in use; the others may have another.
 std::optional<StartLimit> motion_limit(const std::vector<Method>& methods) {
   for (const Method& method : methods)
-    for (const registration::RegistrationView& view : method.runner.problem().views)
+    for (const registration::RegistrationView& view : method.problem().views)
       if (view.reach.has_value()) return StartLimit{view.reach->frame, view.reach->range};
   return std::nullopt;
 }
@@ -156,36 +138,13 @@ void assign_starts(const RegistrationStudyOptions& options,
       method.start_indices.push_back(static_cast<std::int64_t>(i));
 }
 
-void add_result(const RegistrationResult& result,
-                const Yardstick& yardstick,
-                RegistrationRow& row) {
-  row.evaluations = result.evaluations;
-  row.inadmissible = result.inadmissible;
-  row.drr_count = result.drr_count;
-  row.chain = result.chain;
-  row.stop_reason = to_string(result.stop_reason);
-  row.seconds = result.seconds;
-  row.is_corrected = result.correction.has_value();
-  row.correction = result.correction.value_or(registration::CorrectionReport());
-  if (!result.has_pose()) return;
-  row.similarity = result.similarity;
-  measure_pose(result.room_from_ct, yardstick, row);
-}
-
-/// What a registration says of itself, and how its error lies in its covariance.
-void add_uncertainty(Method& method, const RegistrationResult& result, RegistrationRow& row) {
-  if (method.estimator == nullptr) return;
-  row.chain_distance_mm = result.chain_distance_mm;
-  std::vector<registration::ViewValue> values;
-  if (result.has_pose())
-    values = method.examiner->view_values(result.room_from_ct, method.estimator->is_on());
-  row.judge = registration::judge_summary(values);
-  row.uncertainty = method.estimator->report(result, values);
-  if (!std::isfinite(row.uncertainty.covariance_deg_mm[0])) return;
+/// How the error of an end lies in its covariance; NaN without either.
+double squared_distance_of(const RegistrationRow& row) {
+  if (!std::isfinite(row.uncertainty.covariance_deg_mm[0])) return RegistrationRow::kMissing;
   const PoseParameters error = PoseParameters::from_deg_and_mm(row.final_deg_mm);
   registration::PoseVector error_rad_mm;
   error_rad_mm << error.rotation_rad, error.translation_mm;
-  row.squared_distance = registration::squared_distance(
+  return registration::squared_distance(
       registration::from_deg_mm(row.uncertainty.covariance_deg_mm), error_rad_mm);
 }
 
@@ -194,23 +153,21 @@ TracedRow traced_row(Method& method,
                      const PerturbedStart& start,
                      std::int64_t index,
                      const Yardstick& yardstick) {
-  RegistrationResult result;
+  std::vector<registration::TraceRow> trace;
   TracedRow traced;
   RegistrationRow& row = traced.row;
   row = registered_row(
       [&](const RigidTransform& room_from_ct) {
-        result = method.runner.run(room_from_ct, index);
-        return result;
+        RegistrationRecord record = method.registrar.run(room_from_ct, index);
+        trace = std::move(record.result.trace);
+        return record;
       },
       start,
-      yardstick,
-      [&](const RegistrationResult& ended, RegistrationRow& of_it) {
-        add_uncertainty(method, ended, of_it);
-      });
+      yardstick);
   row.renderer = method.renderer;
   row.start_index = index;
   if (!row.is_right(method.success_tre_mm))
-    traced.trace = trace_points(result.trace, method.runner.problem().frame(), yardstick);
+    traced.trace = trace_points(trace, method.problem().frame(), yardstick);
   return traced;
 }
 
@@ -264,10 +221,6 @@ FirstTraces add_rows(const MethodRows& method, std::vector<RegistrationRow>& row
   return traces;
 }
 
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
 /// Typical number of poses that a method tries: medians of preset paper, and of robust, whose steps
 /// come from normal equations.
 double usual_poses(const registration::RegistrationOptions& options) {
@@ -275,8 +228,7 @@ double usual_poses(const registration::RegistrationOptions& options) {
 }
 
 /// Rank 0 says how long each method will take, from a sample: one row by fields; by ray casting,
-/// where that would be long, one similarity for each of the poses that the sample tried. When the
-/// sample fails, nothing is said: the run itself will report why.
+/// where that would be long, one similarity for each of the poses that the sample tried.
 void announce_times(std::vector<Method>& methods,
                     const std::string& case_name,
                     const StratifiedStarts& starts,
@@ -284,30 +236,23 @@ void announce_times(std::vector<Method>& methods,
                     const Communicator& world) {
   std::optional<double> poses_tried;  // by the field's sample
   for (Method& method : methods) {
-    if (!world.is_root() || method.start_indices.size() < 2) continue;
+    if (method.start_indices.empty()) continue;
     const std::int64_t index = method.start_indices[method.start_indices.size() / 2];
     const PerturbedStart& start = starts.starts[static_cast<std::size_t>(index)];
-    double seconds = 0.0;
-    try {
-      const auto begin = std::chrono::steady_clock::now();
-      if (method.renderer == "field") {
-        const RegistrationRow row = traced_row(method, start, index, yardstick).row;
-        seconds = seconds_since(begin);
-        if (!row.error.empty()) continue;
-        poses_tried = static_cast<double>(row.evaluations);
-      } else {
-        std::ignore = method.runner.similarity_at(start.room_from_ct);
-        const double poses = poses_tried.value_or(usual_poses(method.runner.options()));
-        seconds = poses * seconds_since(begin);
-      }
-    } catch (const std::exception&) {
-      continue;
-    }
-    inform(world,
-           expected_time_text("case " + case_name + ", " + method.renderer + " registrations",
-                              static_cast<std::int64_t>(method.start_indices.size()),
-                              seconds,
-                              world.size()));
+    announce_time(world,
+                  "case " + case_name + ", " + method.renderer + " registrations",
+                  static_cast<std::int64_t>(method.start_indices.size()),
+                  [&] {
+                    if (method.renderer == "field") {
+                      const RegistrationRow row = traced_row(method, start, index, yardstick).row;
+                      if (!row.error.empty()) throw NumericError(row.error);
+                      poses_tried = static_cast<double>(row.evaluations);
+                      return 1.0;
+                    }
+                    registration::RegistrationRunner& runner = method.registrar.runner();
+                    std::ignore = runner.similarity_at(start.room_from_ct);
+                    return poses_tried.value_or(usual_poses(runner.options()));
+                  });
   }
 }
 
@@ -385,13 +330,11 @@ void draw_overlays(const Method& method,
                    const std::filesystem::path& folder,
                    CaseEvaluation& evaluation) {
   for (const auto& [which, row] : chosen) {
-    const RigidTransform pose = pose_from_parameters(
-        yardstick.gold_frame, PoseParameters::from_deg_and_mm(row.final_deg_mm));
-    const RigidTransform start = pose_from_parameters(
-        yardstick.gold_frame, PoseParameters::from_deg_and_mm(row.start_deg_mm));
+    const RigidTransform pose = yardstick.pose_of(row.final_deg_mm);
+    const RigidTransform start = yardstick.pose_of(row.start_deg_mm);
     const std::string slicer = "slicer/" + file_name_part(evaluation.case_name) + "-" + which;
-    registration::write_slicer_folder(method.runner.problem(), pose, study_case, folder / slicer);
-    for (const registration::RegistrationView& view : method.runner.problem().views) {
+    registration::write_slicer_folder(method.problem(), pose, study_case, folder / slicer);
+    for (const registration::RegistrationView& view : method.problem().views) {
       const std::string& camera = view.view.camera.name;
       const std::string name = file_name_part(evaluation.case_name) + "-" + which + "-" +
                                file_name_part(camera) + ".png";
@@ -451,7 +394,7 @@ void draw_pictures(const RegistrationStudyOptions& options,
                    const Yardstick& yardstick,
                    CaseEvaluation& evaluation) {
   const WorkNote note("drawing case " + study_case.name, WorkNote::Kind::Phase);
-  draw_xrays(method.runner.problem(), options.output_folder, evaluation);
+  draw_xrays(method.problem(), options.output_folder, evaluation);
   draw_overlays(
       method, chosen_rows(rows), study_case, yardstick, options.output_folder, evaluation);
 }
@@ -526,16 +469,21 @@ void set_start(const PerturbedStart& start, RegistrationRow& row) {
 }
 
 RegistrationRow registered_row(
-    const std::function<RegistrationResult(const RigidTransform& start)>& run,
+    const std::function<RegistrationRecord(const RigidTransform& start)>& run,
     const PerturbedStart& start,
-    const Yardstick& yardstick,
-    const std::function<void(const RegistrationResult& result, RegistrationRow& row)>& add_more) {
+    const Yardstick& yardstick) {
   RegistrationRow row;
   set_start(start, row);
   try {
-    const RegistrationResult result = run(start.room_from_ct);
-    add_result(result, yardstick, row);
-    add_more(result, row);
+    const RegistrationRecord record = run(start.room_from_ct);
+    set_result(record, row);
+    if (record.result.has_pose()) {
+      measure_pose(record.result.room_from_ct, yardstick, row);
+      row.squared_distance = squared_distance_of(row);
+    } else {
+      row.similarity = RegistrationRow::kMissing;
+      row.judge = RegistrationRow().judge;
+    }
   } catch (const std::exception& error) {
     row.stop_reason = "error";
     row.error = error.what();
@@ -567,9 +515,16 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
                     evaluation.inputs,
                     uncertainty.is_left_out ? 0 : PoseExaminer::coarsest_level(),
                     kept_fields)) {
-    methods.push_back(
-        {method.renderer, std::move(method.runner), {}, options.success_tre_mm, {}, {}});
-    all_or_none(world, [&] { examine_ends(method.problem, uncertainty, methods.back()); });
+    all_or_none(world, [&] {
+      methods.push_back({method.renderer,
+                         registration::Registrar(method.problem,
+                                                 std::move(method.runner),
+                                                 uncertainty,
+                                                 nullptr,
+                                                 !uncertainty.is_left_out),
+                         {},
+                         options.success_tre_mm});
+    });
   }
   const Yardstick yardstick = all_or_none(world, [&] {
     evaluation.gold = gold_standard(study, study_case, options.gold);

@@ -15,7 +15,7 @@
 #include "evaluate/registration/yardstick.h"
 #include "evaluate/starts/perturbed_starts.h"
 #include "parallel/communicator.h"
-#include "register/method/registration.h"
+#include "register/uncertainty/registrar.h"
 #include "run/run_folder.h"
 #include "study/case_gold_standard.h"
 #include "study/study_file.h"
@@ -56,16 +56,13 @@ StratifiedStarts given_starts(const RegistrationStudyOptions& options,
 /// The start of a row.
 void set_start(const PerturbedStart& start, RegistrationRow& row);
 
-/// The row of one registration, without case, renderer and start index, and with what `add_more`
-/// adds of its result. Never throws for `run` and `add_more`: an exception becomes stop reason
-/// "error" with its message; a result without similarity has no pose.
+/// The row of one registration, without case and renderer. Never throws for `run`: an exception
+/// becomes stop reason "error" with its message; a result without similarity has no pose.
 /// \test RegisteredRow.OfARegistrationThatThrowsIsAFailure
 RegistrationRow registered_row(
-    const std::function<registration::RegistrationResult(const RigidTransform& start)>& run,
+    const std::function<registration::RegistrationRecord(const RigidTransform& start)>& run,
     const PerturbedStart& start,
-    const Yardstick& yardstick,
-    const std::function<void(const registration::RegistrationResult& result, RegistrationRow& row)>&
-        add_more = [](const registration::RegistrationResult&, RegistrationRow&) {});
+    const Yardstick& yardstick);
 
 /// Collective. Draws a case's starts, calls `on_starts` with the evaluation so far (on every rank,
 /// before anything is registered), registers from every start with every renderer, the work shared

@@ -6,75 +6,62 @@
 #include <vector>
 
 #include "evaluate/outputs/sample_summary_json.h"
+#include "text/csv_cells.h"
 
 namespace af::evaluation {
 
 using nlohmann::json;
 
 CsvTable case_table(const json& renderers) {
-  CsvTable table({"renderer",
-                  "case",
-                  "starts",
-                  "successes",
-                  "success_rate",
-                  "mean_tre_of_successes_mm",
-                  "sd_tre_of_successes_mm",
-                  "median_tre_of_all_mm",
-                  "p95_tre_of_all_mm",
-                  "gross_failures",
-                  "mrpd_successes",
-                  "capture_range_mm",
-                  "capture_range_ended_by"});
-  const auto add = [&](const std::string& renderer, const std::string& name, const json& part) {
+  std::vector<CsvCells> rows;
+  const auto add = [&](const json& renderer, const std::string& name, const json& part) {
     const json& successes = part.at("tre_of_successes_mm");
     const json& all = part.at("tre_of_all_mm");
     const json& range = part.at("capture_range");
-    table.add_row({renderer,
-                   name,
-                   part.at("starts").dump(),
-                   part.at("successes").dump(),
-                   number_text(number_of(part.at("rate"))),
-                   number_text(number_of(successes.at("mean"))),
-                   number_text(number_of(successes.at("sd"))),
-                   number_text(number_of(all.at("median"))),
-                   number_text(number_of(all.at("p95"))),
-                   part.at("gross_failures").at("successes").dump(),
-                   part.at("mrpd_success").at("successes").dump(),
-                   range.is_object() ? number_text(number_of(range.at("initial_tre_mm"))) : "nan",
-                   range.is_object() ? range.at("ended_by").get<std::string>() : ""});
+    rows.push_back(
+        {{"renderer", renderer.at("renderer").get<std::string>()},
+         {"case", name},
+         {"starts", part.at("starts").dump()},
+         {"successes", part.at("successes").dump()},
+         {"success_rate", number_of(part.at("rate"))},
+         {"mean_tre_of_successes_mm", number_of(successes.at("mean"))},
+         {"sd_tre_of_successes_mm", number_of(successes.at("sd"))},
+         {"median_tre_of_all_mm", number_of(all.at("median"))},
+         {"p95_tre_of_all_mm", number_of(all.at("p95"))},
+         {"gross_failures", part.at("gross_failures").at("successes").dump()},
+         {"mrpd_successes", part.at("mrpd_success").at("successes").dump()},
+         {"capture_range_mm", range.is_object() ? number_of(range.at("initial_tre_mm")) : kNan},
+         {"capture_range_ended_by",
+          range.is_object() ? range.at("ended_by").get<std::string>() : ""}});
   };
   for (const json& renderer : renderers) {
-    const auto name = renderer.at("renderer").get<std::string>();
     for (const json& entry : renderer.at("cases"))
-      add(name, entry.at("case").get<std::string>(), entry);
-    add(name, "all", renderer);
+      add(renderer, entry.at("case").get<std::string>(), entry);
+    add(renderer, "all", renderer);
   }
-  return table;
+  return csv_table(std::move(rows));
 }
 
 CsvTable drawn_starts_table(const json& cases, const json& renderers) {
-  CsvTable table(
-      {"case", "low_mm", "high_mm", "draws", "refused_draws", "rotation_share_of_starts"});
+  std::vector<CsvCells> rows;
   const json& intervals = renderers.at(0).at("intervals");
   for (const json& of_case : cases)
     for (std::size_t k = 0; k < intervals.size(); ++k) {
       const auto number = [&](const char* key) {
         const json& values = of_case.at(key);
-        return k < values.size() && values.at(k).is_number()
-                   ? number_text(values.at(k).get<double>())
-                   : std::string("nan");
+        return k < values.size() ? number_of(values.at(k)) : kNan;
       };
-      table.add_row({of_case.at("case").get<std::string>(),
-                     number_text(number_of(intervals.at(k).at("low_mm"))),
-                     number_text(number_of(intervals.at(k).at("high_mm"))),
-                     number("draws_per_interval"),
-                     // Zeros of starts that were not drawn say nothing.
-                     of_case.at("draws_per_interval").empty()
-                         ? "nan"
-                         : number("inadmissible_draws_per_interval"),
-                     number("rotation_share_per_interval")});
+      // Zeros of starts that were not drawn say nothing.
+      const bool is_drawn = !of_case.at("draws_per_interval").empty();
+      rows.push_back(
+          {{"case", of_case.at("case").get<std::string>()},
+           {"low_mm", number_of(intervals.at(k).at("low_mm"))},
+           {"high_mm", number_of(intervals.at(k).at("high_mm"))},
+           {"draws", number("draws_per_interval")},
+           {"refused_draws", is_drawn ? number("inadmissible_draws_per_interval") : kNan},
+           {"rotation_share_of_starts", number("rotation_share_per_interval")}});
     }
-  return table;
+  return csv_table(std::move(rows));
 }
 
 }  // namespace af::evaluation

@@ -15,7 +15,6 @@
 #include "cli/app_main.h"
 #include "cli/run_limits.h"
 #include "evaluate/methods/loaded_methods.h"
-#include "evaluate/outputs/failed_start.h"
 #include "evaluate/outputs/sample_summary_json.h"
 #include "evaluate/registration/case_evaluation.h"
 #include "evaluate/registration/case_table.h"
@@ -23,10 +22,10 @@
 #include "evaluate/registration/found_poses.h"
 #include "evaluate/registration/paired_statistics.h"
 #include "evaluate/registration/registration_statistics.h"
+#include "evaluate/report/evaluation_run.h"
 #include "evaluate/report/report_program.h"
 #include "files/output_file.h"
 #include "files/sha256.h"
-#include "gold_standard/target_box.h"
 #include "gold_standard/tre.h"
 #include "parallel/work_watch.h"
 #include "pose_files/pose_file.h"
@@ -72,7 +71,7 @@ const std::set<std::string> not_of_repeats = {"--case",
                                               "--raycast-intervals",
                                               "--output"};
 
-/// From what repeat_command() makes the command for one start; null for another program's poses.
+/// From what af-report makes the command for one start; null for another program's poses.
 json repeat_json(const RegistrationStudyOptions& options) {
   if (!options.poses_from.empty()) return nullptr;
   const std::filesystem::path folder =
@@ -160,23 +159,15 @@ std::vector<std::string> warnings_about_starts(const RegistrationStudyOptions& o
 
 /// How far the end poses of two rows lie apart, over the target points of their case.
 EndDistance end_distance_of(const Study& study, const std::vector<CaseEvaluation>& evaluations) {
-  struct Target {
-    PoseFrame frame;
-    std::vector<Eigen::Vector3d> points_ct_mm;
-  };
-  std::map<std::string, Target> targets;
-  for (const CaseEvaluation& evaluation : evaluations) {
-    const StudyCase& study_case = study.find_case(evaluation.case_name);
-    targets[evaluation.case_name] = {
-        PoseFrame::about(evaluation.gold.room_from_ct, study_case.center_ct_mm),
-        target_points(study_case.target_box_ct)};
-  }
-  return [targets = std::move(targets)](const RegistrationRow& a, const RegistrationRow& b) {
-    const Target& target = targets.at(a.case_name);
-    const auto end_of = [&](const RegistrationRow& row) {
-      return pose_from_parameters(target.frame, PoseParameters::from_deg_and_mm(row.final_deg_mm));
-    };
-    return mean_tre_mm(end_of(a), end_of(b), target.points_ct_mm);
+  std::map<std::string, Yardstick> yardsticks;
+  for (const CaseEvaluation& evaluation : evaluations)
+    yardsticks[evaluation.case_name] =
+        yardstick_of(study, study.find_case(evaluation.case_name), evaluation.gold);
+  return [yardsticks = std::move(yardsticks)](const RegistrationRow& a, const RegistrationRow& b) {
+    const Yardstick& yardstick = yardsticks.at(a.case_name);
+    return mean_tre_mm(yardstick.pose_of(a.final_deg_mm),
+                       yardstick.pose_of(b.final_deg_mm),
+                       yardstick.points_ct_mm);
   };
 }
 
@@ -203,12 +194,10 @@ json summary_json(const RegistrationStudyOptions& options,
                   const Study& study,
                   const std::vector<CaseEvaluation>& evaluations,
                   std::span<const RegistrationRow> rows) {
-  json summary = {{"format", "attenuation-fields evaluation"},
-                  {"format_version", 1},
-                  {"kind", "registration"},
-                  {"study", study.path.string()},
-                  {"success_tre_mm", options.success_tre_mm},
-                  {"start_rule", options.starts_from.empty() ? options.start_rule : "given"}};
+  json summary = summary_of_kind("registration");
+  summary["study"] = study.path.string();
+  summary["success_tre_mm"] = options.success_tre_mm;
+  summary["start_rule"] = options.starts_from.empty() ? options.start_rule : "given";
   const registration::RegistrationOptions method = registration::resolve(options.method);
   summary["method"] = {
       {"preset", options.method.chains.empty() ? options.method.preset_name() : "chain"},

@@ -3,10 +3,11 @@
 
 #include <algorithm>
 #include <iterator>
-#include <string>
 #include <utility>
 
+#include "files/output_file.h"
 #include "gold_standard/tre.h"
+#include "text/csv_cells.h"
 
 namespace af::evaluation {
 
@@ -35,22 +36,23 @@ void keep_if_first(std::int64_t start_index, std::vector<TracePoint> trace, Firs
   if (kept.size() > kMostTraces) kept.erase(std::prev(kept.end()));
 }
 
+std::string trace_file(const std::string& case_name,
+                       const std::string& renderer,
+                       std::int64_t start_index) {
+  return "traces/" + file_name_part(case_name) + "-" + file_name_part(renderer) + "-" +
+         std::to_string(start_index) + ".csv";
+}
+
 CsvTable trace_table(const std::vector<TracePoint>& trace) {
-  std::vector<std::string> columns = {"stage", "step_mm", "poses_tried", "similarity"};
-  for (const char axis : {'x', 'y', 'z'}) columns.push_back(std::string("r") + axis + "_deg");
-  for (const char axis : {'x', 'y', 'z'}) columns.push_back(std::string("t") + axis + "_mm");
-  columns.emplace_back("tre_mm");
-  CsvTable table(std::move(columns));
-  for (const TracePoint& point : trace) {
-    std::vector<std::string> fields = {std::to_string(point.stage),
-                                       number_text(point.step_mm),
-                                       std::to_string(point.poses_tried),
-                                       number_text(point.similarity)};
-    for (const double value : point.deg_mm) fields.push_back(number_text(value));
-    fields.push_back(number_text(point.tre_mm));
-    table.add_row(std::move(fields));
-  }
-  return table;
+  return csv_table(trace, [](const TracePoint& point) {
+    CsvCells cells = {{"stage", point.stage},
+                      {"step_mm", point.step_mm},
+                      {"poses_tried", point.poses_tried},
+                      {"similarity", point.similarity}};
+    append("", kParameterNames, point.deg_mm, cells);
+    cells.emplace_back("tre_mm", point.tre_mm);
+    return cells;
+  });
 }
 
 }  // namespace af::evaluation

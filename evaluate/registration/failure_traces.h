@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <string>
 #include <vector>
 
 #include "evaluate/registration/registration_rows.h"
@@ -31,6 +32,11 @@ using FirstTraces = std::map<std::int64_t, std::vector<TracePoint>>;
 /// Adds the trace of a start, unless it is empty or there are `kMostTraces` of lower indices.
 /// Starts come in any order. \test FailureTraces.AreKeptOfTheFirstFailuresOfAMethodOnly
 void keep_if_first(std::int64_t start_index, std::vector<TracePoint> trace, FirstTraces& kept);
+
+/// Where a failure's trace is below the run's folder: "traces/CASE-RENDERER-START.csv".
+std::string trace_file(const std::string& case_name,
+                       const std::string& renderer,
+                       std::int64_t start_index);
 
 /// stage, step_mm, poses_tried, similarity, rx_deg ... tz_mm (relative to gold), tre_mm.
 CsvTable trace_table(const std::vector<TracePoint>& trace);

@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
-#include <limits>
 #include <span>
 #include <string>
 #include <tuple>
@@ -15,9 +14,7 @@
 #include "evaluate/registration/registration_errors.h"
 #include "evaluate/starts/perturbed_starts.h"
 #include "evaluate/statistics/success_rate.h"
-#include "register/method/correction.h"
-#include "register/uncertainty/uncertainty_report.h"
-#include "register/verdict/verdict.h"
+#include "register/results/registration_columns.h"
 #include "text/csv_table.h"
 
 namespace af::evaluation {
@@ -34,39 +31,15 @@ struct TracePoint {
   auto members() { return std::tie(stage, step_mm, poses_tried, similarity, deg_mm, tre_mm); }
 };
 
-/// One registration as evaluated. Without an end pose (stop reasons of failed registrations)
-/// similarity, TRE and final parameters are NaN.
-struct RegistrationRow {
-  static constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
-
-  std::string case_name;
-  std::string renderer;          ///< "field" or "raycast"
-  std::int64_t start_index = 0;  ///< row of the case's starts in starts.csv
+/// One registration as evaluated; poses are relative to gold, about the ROI centre. Without an end
+/// pose (stop reasons of failed registrations) similarity, TRE and final parameters are NaN.
+struct RegistrationRow : registration::RegistrationRow {
   std::uint64_t draw_index = 0;
   int interval = 0;                      ///< of initial TRE
-  std::array<double, 6> start_deg_mm{};  ///< relative to gold, about the ROI centre
-  std::array<double, 6> final_deg_mm = {kMissing, kMissing, kMissing, kMissing, kMissing, kMissing};
-  double initial_tre_mm = kMissing;
-  double tre_mm = kMissing;
   double stated_pose_tre_mm = kMissing;  ///< against gold_room_from_ct when gold is the fiducials'
   RegistrationErrors errors;
-  double similarity = kMissing;
-  std::int64_t evaluations = 0;
-  std::int64_t inadmissible = 0;
-  std::int64_t drr_count = 0;
-  bool is_corrected = false;  ///< a correction was wanted
-  registration::CorrectionReport correction;
-  // What the registration says of itself, without the gold pose; NaN where it was not asked.
-  registration::JudgeSummary judge = {
-      {kMissing, kMissing}, {kMissing, kMissing}, kMissing, kMissing};
-  registration::UncertaintyReport uncertainty;
-  double chain_distance_mm = kMissing;
   double squared_distance = kMissing;  ///< Mahalanobis, of the error by the covariance
-  std::string stop_reason;
-  std::string chain;     ///< whose end was taken
-  std::string error;     ///< message of a registration that threw
-  double seconds = 0.0;  ///< wall time
-
+  std::string error;                   ///< message of a registration that threw
   /// Of its case, and known where there is an end pose.
   bool has_one_view = false;
 
@@ -77,32 +50,14 @@ struct RegistrationRow {
     return (has_one_view ? errors.mrpd_mm : tre_mm) < success_mm;
   }
   auto members() {
-    return std::tie(case_name,
-                    renderer,
-                    start_index,
-                    draw_index,
-                    interval,
-                    start_deg_mm,
-                    final_deg_mm,
-                    initial_tre_mm,
-                    tre_mm,
-                    stated_pose_tre_mm,
-                    errors,
-                    similarity,
-                    evaluations,
-                    inadmissible,
-                    drr_count,
-                    stop_reason,
-                    chain,
-                    error,
-                    is_corrected,
-                    correction,
-                    judge,
-                    uncertainty,
-                    chain_distance_mm,
-                    squared_distance,
-                    seconds,
-                    has_one_view);
+    return std::tuple_cat(registration::RegistrationRow::members(),
+                          std::tie(draw_index,
+                                   interval,
+                                   stated_pose_tre_mm,
+                                   errors,
+                                   squared_distance,
+                                   error,
+                                   has_one_view));
   }
 };
 

@@ -3,6 +3,7 @@
 // programs.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <vector>
 
@@ -21,6 +22,11 @@ struct Yardstick {
   std::vector<Eigen::Vector3d> points_ct_mm;
   Eigen::Vector3d center_ct_mm = Eigen::Vector3d::Zero();  ///< c_roi
   CameraRig rig;                                           ///< the cameras of the case's views
+
+  /// Of parameters as rows have them.
+  [[nodiscard]] RigidTransform pose_of(const std::array<double, 6>& deg_mm) const {
+    return pose_from_parameters(gold_frame, PoseParameters::from_deg_and_mm(deg_mm));
+  }
 };
 
 Yardstick yardstick_of(const Study& study, const StudyCase& study_case, const GoldStandard& gold);

@@ -34,6 +34,10 @@ void collect(const std::filesystem::path& folder, std::set<std::filesystem::path
 
 }  // namespace
 
+json summary_of_kind(const std::string& kind) {
+  return {{"format", kFormat}, {"format_version", kVersion}, {"kind", kind}};
+}
+
 void EvaluationRun::read_registrations(
     const std::function<void(const CsvTable& part)>& receive) const {
   const std::filesystem::path path = folder / "registrations.csv";

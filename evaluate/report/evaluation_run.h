@@ -11,6 +11,9 @@
 
 namespace af::evaluation {
 
+/// What the summary.json of every kind of run begins with.
+nlohmann::json summary_of_kind(const std::string& kind);
+
 /// One finished registration run of af-evaluate, as its folder tells.
 // nlohmann::json asserts in its move constructor.
 // NOLINTNEXTLINE(bugprone-exception-escape)

@@ -15,7 +15,7 @@
 #include "files/output_file.h"
 #include "study/node_ct.h"
 #include "study/study_file.h"
-#include "text/csv_table.h"
+#include "text/csv_cells.h"
 
 namespace af::evaluation {
 namespace {
@@ -63,25 +63,17 @@ void write_files(const std::vector<SettingResult>& results,
                     ": field - ray casting at " + std::to_string(drrs.size()) +
                     " qualities, in one window",
                 folder / "difference-images.png");
-  CsvTable table({"psnr_db",
-                  "case",
-                  "camera",
-                  "pose_index",
-                  "uv_nodes",
-                  "st_nodes",
-                  "codewords",
-                  "training_fraction"});
-  for (const SweepDrr& drr : drrs) {
+  const CsvTable table = csv_table(drrs, [&](const SweepDrr& drr) -> CsvCells {
     const SettingResult& result = results[drr.result];
-    table.add_row({number_text(result.comparisons[drr.pose].psnr_db),
-                   result.setting.case_name,
-                   result.setting.camera,
-                   std::to_string(drr.pose),
-                   std::to_string(result.setting.design().uv_nodes),
-                   std::to_string(result.setting.design().st_nodes),
-                   std::to_string(result.setting.design().codewords),
-                   number_text(training_share(result.setting))});
-  }
+    return {{"psnr_db", result.comparisons[drr.pose].psnr_db},
+            {"case", result.setting.case_name},
+            {"camera", result.setting.camera},
+            {"pose_index", drr.pose},
+            {"uv_nodes", result.setting.design().uv_nodes},
+            {"st_nodes", result.setting.design().st_nodes},
+            {"codewords", result.setting.design().codewords},
+            {"training_fraction", training_share(result.setting)}};
+  });
   write_text_file(folder / "difference-images.csv", table.to_text());
 }
 

@@ -13,6 +13,7 @@
 #include "evaluate/methods/loaded_methods.h"
 #include "evaluate/outputs/row_gathering.h"
 #include "evaluate/outputs/sample_summary_json.h"
+#include "evaluate/report/evaluation_run.h"
 #include "evaluate/report/report_program.h"
 #include "evaluate/sweeps/similarity_curve.h"
 #include "files/output_file.h"
@@ -21,7 +22,7 @@
 #include "run/run_folder.h"
 #include "study/case_gold_standard.h"
 #include "study/shared_inputs.h"
-#include "text/csv_table.h"
+#include "text/csv_cells.h"
 #include "text/options_toml.h"
 
 namespace af::evaluation {
@@ -76,6 +77,7 @@ void measure_curves(std::vector<LoadedMethod>& methods,
         world, method.renderer + " similarities", static_cast<std::int64_t>(items.size()), [&] {
           std::ignore =
               method.runner.similarity_at(pose_from_parameters(gold_frame, PoseParameters()));
+          return 1.0;
         });
     const std::vector<double> similarities = collected_rows<double>(
         world,
@@ -110,16 +112,21 @@ void find_peaks(std::vector<Curve>& curves) {
     curve.peak = find_peak(curve.offsets, curve.similarity, base_of(curves, curve.renderer));
 }
 
+/// What both tables begin with.
+CsvCells axis_cells(const Curve& curve) {
+  return {{"renderer", curve.renderer},
+          {"parameter", kAxisNames[static_cast<std::size_t>(curve.axis)]},
+          {"unit", unit_of(curve.axis)}};
+}
+
 CsvTable curves_table(const std::vector<Curve>& curves) {
-  CsvTable table({"renderer", "parameter", "unit", "offset", "similarity"});
+  std::vector<CsvCells> rows;
   for (const Curve& curve : curves)
-    for (std::size_t i = 0; i < curve.offsets.size(); ++i)
-      table.add_row({curve.renderer,
-                     kAxisNames[static_cast<std::size_t>(curve.axis)],
-                     unit_of(curve.axis),
-                     number_text(curve.offsets[i]),
-                     number_text(curve.similarity[i])});
-  return table;
+    for (std::size_t i = 0; i < curve.offsets.size(); ++i) {
+      rows.push_back(axis_cells(curve));
+      append({{"offset", curve.offsets[i]}, {"similarity", curve.similarity[i]}}, rows.back());
+    }
+  return csv_table(std::move(rows));
 }
 
 /// Width in mm: of angles, at the target box's RMS radius about the centre of rotation.
@@ -128,24 +135,16 @@ double width_mm(const Curve& curve, double radius_mm) {
 }
 
 CsvTable maxima_table(const std::vector<Curve>& curves, double radius_mm) {
-  CsvTable table({"renderer",
-                  "parameter",
-                  "unit",
-                  "offset_of_maximum",
-                  "similarity_at_maximum",
-                  "at_edge",
-                  "width",
-                  "width_mm_at_target"});
-  for (const Curve& curve : curves)
-    table.add_row({curve.renderer,
-                   kAxisNames[static_cast<std::size_t>(curve.axis)],
-                   unit_of(curve.axis),
-                   number_text(curve.peak.offset),
-                   number_text(curve.peak.similarity),
-                   curve.peak.is_at_edge ? "1" : "0",
-                   number_text(curve.peak.width),
-                   number_text(width_mm(curve, radius_mm))});
-  return table;
+  return csv_table(curves, [&](const Curve& curve) {
+    CsvCells cells = axis_cells(curve);
+    append({{"offset_of_maximum", curve.peak.offset},
+            {"similarity_at_maximum", curve.peak.similarity},
+            {"at_edge", curve.peak.is_at_edge},
+            {"width", curve.peak.width},
+            {"width_mm_at_target", width_mm(curve, radius_mm)}},
+           cells);
+    return cells;
+  });
 }
 
 /// The axis of the widest peak. A width that leaves the window counts as widest; when two or more
@@ -284,14 +283,12 @@ void run_similarity_curves(const SimilarityCurvesOptions& options,
     run.begin_results();
     write_text_file(folder / "similarity-curves.csv", curves_table(curves).to_text());
     write_text_file(folder / "maxima.csv", maxima_table(curves, radius_mm).to_text());
-    json summary = {{"format", "attenuation-fields evaluation"},
-                    {"format_version", 1},
-                    {"kind", "similarity-curves"},
-                    {"case", study_case.name},
-                    {"gold", to_json(gold)},
-                    {"similarity", methods.front().runner.options().final_similarity()},
-                    {"rms_radius_mm", radius_mm},
-                    {"figures", {"similarity-curves"}}};
+    json summary = summary_of_kind("similarity-curves");
+    summary["case"] = study_case.name;
+    summary["gold"] = to_json(gold);
+    summary["similarity"] = methods.front().runner.options().final_similarity();
+    summary["rms_radius_mm"] = radius_mm;
+    summary["figures"] = {"similarity-curves"};
     summary["renderers"] = json::array();
     for (const std::string& renderer : options.chosen_renderers())
       summary["renderers"].push_back(renderer_json(curves, renderer, radius_mm));

@@ -7,7 +7,7 @@
 
 #include "evaluate/outputs/sample_summary_json.h"
 #include "files/output_file.h"
-#include "text/csv_table.h"
+#include "text/csv_cells.h"
 
 namespace af::evaluation {
 namespace {
@@ -69,86 +69,63 @@ std::vector<PooledSetting> pooled_settings(const std::vector<SettingResult>& res
   return pools;
 }
 
-std::vector<std::string> setting_fields(const PrecomputeOptions& setting) {
-  return {std::to_string(setting.design().uv_nodes),
-          std::to_string(setting.design().st_nodes),
-          std::to_string(setting.design().codewords),
-          number_text(training_share(setting)),
-          std::to_string(setting.design().slabs)};
+CsvCells setting_cells(const PrecomputeOptions& setting) {
+  return {{"uv_nodes", setting.design().uv_nodes},
+          {"st_nodes", setting.design().st_nodes},
+          {"codewords", setting.design().codewords},
+          {"training_fraction", training_share(setting)},
+          {"slabs", setting.design().slabs}};
 }
 
-const std::vector<std::string>& setting_columns() {
-  static const std::vector<std::string> columns = {
-      "uv_nodes", "st_nodes", "codewords", "training_fraction", "slabs"};
-  return columns;
+CsvCells target_cells(const PrecomputeOptions& setting) {
+  CsvCells cells = {{"case", setting.case_name}, {"camera", setting.camera}};
+  append(setting_cells(setting), cells);
+  return cells;
 }
 
-std::vector<std::string> followed_by(std::vector<std::string> a,
-                                     const std::vector<std::string>& b) {
-  a.insert(a.end(), b.begin(), b.end());
-  return a;
-}
-
-const std::vector<std::string>& measured_columns() {
-  static const std::vector<std::string> columns = {"psnr_mean_db",
-                                                   "psnr_median_db",
-                                                   "psnr_q1_db",
-                                                   "psnr_q3_db",
-                                                   "psnr_p5_db",
-                                                   "psnr_min_db",
-                                                   "uncompressed_bytes",
-                                                   "payload_bytes",
-                                                   "file_bytes",
-                                                   "payload_compression",
-                                                   "file_compression",
-                                                   "creation_ranks",
-                                                   "creation_seconds"};
-  return columns;
-}
-
-std::vector<std::string> measured_fields(const PooledSetting& pool) {
+CsvCells measured_cells(const PooledSetting& pool) {
   const SampleSummary& psnr = pool.psnr_db;
-  return {number_text(psnr.mean),
-          number_text(psnr.median),
-          number_text(psnr.lower_quartile),
-          number_text(psnr.upper_quartile),
-          number_text(psnr.percentile_5),
-          number_text(psnr.minimum),
-          number_text(pool.uncompressed_bytes),
-          number_text(pool.payload_bytes),
-          number_text(pool.file_bytes),
-          number_text(pool.uncompressed_bytes / pool.payload_bytes),
-          number_text(pool.uncompressed_bytes / pool.file_bytes),
-          std::to_string(pool.creation_ranks),
-          number_text(pool.creation_seconds)};
+  return {{"psnr_mean_db", psnr.mean},
+          {"psnr_median_db", psnr.median},
+          {"psnr_q1_db", psnr.lower_quartile},
+          {"psnr_q3_db", psnr.upper_quartile},
+          {"psnr_p5_db", psnr.percentile_5},
+          {"psnr_min_db", psnr.minimum},
+          {"uncompressed_bytes", pool.uncompressed_bytes},
+          {"payload_bytes", pool.payload_bytes},
+          {"file_bytes", pool.file_bytes},
+          {"payload_compression", pool.uncompressed_bytes / pool.payload_bytes},
+          {"file_compression", pool.uncompressed_bytes / pool.file_bytes},
+          {"creation_ranks", pool.creation_ranks},
+          {"creation_seconds", pool.creation_seconds}};
 }
 
 CsvTable settings_table(const std::vector<PooledSetting>& pools) {
-  CsvTable table(followed_by(setting_columns(), measured_columns()));
-  for (const PooledSetting& pool : pools)
-    table.add_row(followed_by(setting_fields(pool.setting), measured_fields(pool)));
-  return table;
+  std::vector<CsvCells> rows;
+  for (const PooledSetting& pool : pools) {
+    rows.push_back(setting_cells(pool.setting));
+    append(measured_cells(pool), rows.back());
+  }
+  return csv_table(std::move(rows));
 }
 
 CsvTable fields_table(const std::vector<SettingResult>& results) {
-  CsvTable table(
-      followed_by(followed_by({"case", "camera"}, setting_columns()), measured_columns()));
-  for (const SettingResult& result : results)
-    table.add_row(followed_by(followed_by({result.setting.case_name, result.setting.camera},
-                                          setting_fields(result.setting)),
-                              measured_fields(pooled({&result}))));
-  return table;
+  std::vector<CsvCells> rows;
+  for (const SettingResult& result : results) {
+    rows.push_back(target_cells(result.setting));
+    append(measured_cells(pooled({&result})), rows.back());
+  }
+  return csv_table(std::move(rows));
 }
 
 CsvTable poses_table(const std::vector<SettingResult>& results) {
-  CsvTable table(
-      followed_by(followed_by({"case", "camera"}, setting_columns()), {"pose_index", "psnr_db"}));
+  std::vector<CsvCells> rows;
   for (const SettingResult& result : results)
-    for (std::size_t i = 0; i < result.comparisons.size(); ++i)
-      table.add_row(followed_by(followed_by({result.setting.case_name, result.setting.camera},
-                                            setting_fields(result.setting)),
-                                {std::to_string(i), number_text(result.comparisons[i].psnr_db)}));
-  return table;
+    for (std::size_t i = 0; i < result.comparisons.size(); ++i) {
+      rows.push_back(target_cells(result.setting));
+      append({{"pose_index", i}, {"psnr_db", result.comparisons[i].psnr_db}}, rows.back());
+    }
+  return csv_table(std::move(rows));
 }
 
 json pooled_json(const PooledSetting& pool) {

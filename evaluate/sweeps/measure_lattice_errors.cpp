@@ -22,7 +22,7 @@
 #include "run/progress_printer.h"
 #include "study/case_gold_standard.h"
 #include "study/shared_inputs.h"
-#include "text/csv_table.h"
+#include "text/csv_cells.h"
 
 namespace af::evaluation {
 namespace {
@@ -113,18 +113,16 @@ std::vector<LatticeEnds> measured_ends(const std::vector<LoadedMethod>& methods,
 }
 
 CsvTable poses_table(const std::vector<LatticePose>& poses, const std::vector<LatticeEnds>& ends) {
-  std::vector<std::string> columns = {"renderer", "pose"};
-  for (const char* axis : kCellAxisNames) columns.push_back(std::string(axis) + "_fraction");
-  for (const char* name : kParameterNames) columns.push_back(std::string("error_") + name);
-  CsvTable table(columns);
+  std::vector<CsvCells> rows;
   for (const LatticeEnds& of : ends)
     for (std::size_t i = 0; i < poses.size(); ++i) {
-      std::vector<std::string> row = {of.renderer, std::to_string(i)};
-      for (const int fraction : poses[i].fraction) row.push_back(std::to_string(fraction));
-      for (const double error : of.errors[i]) row.push_back(number_text(error));
-      table.add_row(row);
+      CsvCells& cells = rows.emplace_back(CsvCells{{"renderer", of.renderer}, {"pose", i}});
+      for (std::size_t axis = 0; axis < kCellAxisNames.size(); ++axis)
+        cells.emplace_back(std::string(kCellAxisNames[axis]) + "_fraction",
+                           poses[i].fraction[axis]);
+      append("error_", kParameterNames, of.errors[i], cells);
     }
-  return table;
+  return csv_table(std::move(rows));
 }
 
 std::string markdown(const std::vector<LatticePose>& poses,

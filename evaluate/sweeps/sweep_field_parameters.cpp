@@ -15,6 +15,7 @@
 #include "drr/two_pass_af_drr.h"
 #include "evaluate/image_quality/image_quality_tables.h"
 #include "evaluate/outputs/row_gathering.h"
+#include "evaluate/report/evaluation_run.h"
 #include "evaluate/report/report_program.h"
 #include "evaluate/sweeps/difference_images.h"
 #include "evaluate/sweeps/field_parameter_tables.h"
@@ -122,9 +123,7 @@ void write_results(const FieldParametersOptions& options,
   const std::filesystem::path& folder = options.output_folder;
   run.begin_results();
   json summary = write_sweep(results, folder);
-  summary["format"] = "attenuation-fields evaluation";
-  summary["format_version"] = 1;
-  summary["kind"] = "field-parameters";
+  summary.update(summary_of_kind("field-parameters"));
   summary["difference_images"] = difference_images;
   run.finish(std::move(summary), provenance);
   std::cout << sweep_text(results) << "results: " << folder.string() << '\n';

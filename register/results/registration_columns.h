@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The columns of registrations.csv, which af-register and af-evaluate write.
+// The row of a registration in registrations.csv, which af-register and af-evaluate write.
 #pragma once
 
 #include <array>
@@ -7,56 +7,83 @@
 #include <limits>
 #include <optional>
 #include <string>
-#include <string_view>
-#include <utility>
-#include <vector>
+#include <tuple>
 
 #include "register/method/correction.h"
 #include "register/uncertainty/uncertainty_report.h"
 #include "register/verdict/verdict.h"
+#include "text/csv_cells.h"
 
 namespace af::registration {
 
 /// What every registrations.csv says of a registration. NaN: not known.
-struct RegistrationCells {
+struct RegistrationRow {
+  static constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
+
   std::string case_name;
+  std::string renderer;  ///< "field", "raycast" or the name of another program's poses
   std::int64_t start_index = 0;
-  std::string renderer;
   std::array<double, 6> start_deg_mm{};
-  std::array<double, 6> final_deg_mm{};
-  double initial_tre_mm = std::numeric_limits<double>::quiet_NaN();
-  double tre_mm = std::numeric_limits<double>::quiet_NaN();
-  double similarity = std::numeric_limits<double>::quiet_NaN();
+  std::array<double, 6> final_deg_mm = {kMissing, kMissing, kMissing, kMissing, kMissing, kMissing};
+  double initial_tre_mm = kMissing;
+  double tre_mm = kMissing;
+  double similarity = kMissing;
   std::int64_t evaluations = 0;
   std::string stop_reason;
   std::int64_t inadmissible = 0;
   std::int64_t drr_count = 0;
   std::string chain;  ///< of the method, whose end was taken; empty for other programs' poses
-  double seconds = 0.0;
+  JudgeSummary judge = {{kMissing, kMissing}, {kMissing, kMissing}, kMissing, kMissing};
+  UncertaintyReport uncertainty;
+  double chain_distance_mm = kMissing;
+  std::optional<CorrectionReport> correction;  ///< where one was wanted
+  double seconds = 0.0;                        ///< wall time
+
+  auto members() {
+    return std::tie(case_name,
+                    renderer,
+                    start_index,
+                    start_deg_mm,
+                    final_deg_mm,
+                    initial_tre_mm,
+                    tre_mm,
+                    similarity,
+                    evaluations,
+                    stop_reason,
+                    inadmissible,
+                    drr_count,
+                    chain,
+                    judge,
+                    uncertainty,
+                    chain_distance_mm,
+                    correction,
+                    seconds);
+  }
 };
 
-/// Name of a column, which must last, and the text in it.
-using NamedCells = std::vector<std::pair<std::string_view, std::string>>;
+/// Which parts of the columns a table has.
+struct RowParts {
+  bool uncertainty = false;
+  bool correction = false;
+};
 
-/// A row in the order of the columns: the contract's, with a program's own columns after the stop
-/// reason and before the time.
-NamedCells registration_row(const RegistrationCells& row,
-                            const NamedCells& behind_stop_reason,
-                            const NamedCells& before_seconds);
+/// A program's own columns.
+struct OwnCells {
+  CsvCells behind_stop_reason = {};
+  CsvCells behind_chain = {};
+  CsvCells behind_uncertainty = {};
+};
+
+/// A row in the order of the columns: the contract's, with a program's own between them.
+CsvCells registration_cells(const RegistrationRow& row, const RowParts& parts, OwnCells own);
 
 /// What a correction adds before the time; empty cells where there was none.
-NamedCells correction_cells(const std::optional<CorrectionReport>& correction);
+CsvCells correction_cells(const std::optional<CorrectionReport>& correction);
 
-NamedCells judge_cells(const JudgeSummary& judge);
+CsvCells judge_cells(const JudgeSummary& judge);
 
 /// Uncertainty: predicted TREs, confidence, inflations, distance of the chains, and the
 /// covariance's upper triangle as `cov_rx_rx` (deg^2), `cov_rx_tx` (deg mm) ... `cov_tz_tz` (mm^2).
-NamedCells uncertainty_cells(const UncertaintyReport& report, double chain_distance_mm);
-
-void append(const NamedCells& more, NamedCells& cells);
-
-/// The names or the texts alone.
-std::vector<std::string> names_of(const NamedCells& cells);
-std::vector<std::string> texts_of(NamedCells cells);
+CsvCells uncertainty_cells(const UncertaintyReport& report, double chain_distance_mm);
 
 }  // namespace af::registration

@@ -13,7 +13,6 @@
 #include "files/output_file.h"
 #include "pose_files/pose_file.h"
 #include "register/problem/silhouette.h"
-#include "register/results/registration_columns.h"
 
 namespace af::registration {
 namespace {
@@ -106,10 +105,6 @@ std::string counts_text(const std::vector<RegistrationRecord>& records) {
 }
 
 }  // namespace
-
-Judgement judgement_of(const RegistrationRecord& record) {
-  return judgement_of(record.result, record.view_values, record.diagnosis);
-}
 
 bool is_better(const RegistrationRecord& a, const RegistrationRecord& b) {
   const bool a_has = std::isfinite(a.result.similarity);
@@ -232,35 +227,42 @@ json result_json(const RegistrationRecord& record,
   return output;
 }
 
-namespace {
-
-NamedCells cells_of(const RegistrationRecord& record,
-                    const PoseFrame& frame,
-                    const RunDescription& run) {
+void set_result(const RegistrationRecord& record, RegistrationRow& row) {
   const RegistrationResult& result = record.result;
-  RegistrationCells row;
-  row.case_name = run.case_name;
   row.start_index = record.start_index;
-  row.renderer = run.renderer;
-  row.start_deg_mm = parameters_from_pose(frame, result.start_room_from_ct).deg_and_mm();
-  row.final_deg_mm = parameters_from_pose(frame, result.room_from_ct).deg_and_mm();
-  if (record.errors.has_value()) {
-    row.initial_tre_mm = record.errors->initial_tre_mm;
-    row.tre_mm = record.errors->tre_mm;
-  }
   row.similarity = result.similarity;
   row.evaluations = result.evaluations;
   row.stop_reason = to_string(result.stop_reason);
   row.inadmissible = result.inadmissible;
   row.drr_count = result.drr_count;
   row.chain = result.chain;
+  row.judge = judge_summary(record.view_values);
+  row.uncertainty = record.uncertainty;
+  row.chain_distance_mm = result.chain_distance_mm;
+  row.correction = result.correction;
   row.seconds = result.seconds;
-  NamedCells before_seconds = {{"relative_to", "nominal"},
-                               {"verdict", to_string(judgement_of(record).verdict)}};
-  append(judge_cells(judge_summary(record.view_values)), before_seconds);
-  append(uncertainty_cells(record.uncertainty, result.chain_distance_mm), before_seconds);
-  if (result.correction.has_value()) append(correction_cells(result.correction), before_seconds);
-  return registration_row(row, {}, before_seconds);
+}
+
+namespace {
+
+CsvCells cells_of(const RegistrationRecord& record,
+                  const PoseFrame& frame,
+                  const RunDescription& run) {
+  RegistrationRow row;
+  row.case_name = run.case_name;
+  row.renderer = run.renderer;
+  set_result(record, row);
+  row.start_deg_mm = parameters_from_pose(frame, record.result.start_room_from_ct).deg_and_mm();
+  row.final_deg_mm = parameters_from_pose(frame, record.result.room_from_ct).deg_and_mm();
+  if (record.errors.has_value()) {
+    row.initial_tre_mm = record.errors->initial_tre_mm;
+    row.tre_mm = record.errors->tre_mm;
+  }
+  return registration_cells(
+      row,
+      {.uncertainty = true, .correction = row.correction.has_value()},
+      {.behind_chain = {{"relative_to", "nominal"},
+                        {"verdict", to_string(judgement_of(record).verdict)}}});
 }
 
 }  // namespace
@@ -268,14 +270,11 @@ NamedCells cells_of(const RegistrationRecord& record,
 CsvTable registrations_table(std::vector<RegistrationRecord> records,
                              const RegistrationProblem& problem,
                              const RunDescription& run) {
-  std::sort(records.begin(), records.end(), [](const auto& a, const auto& b) {
-    return a.start_index < b.start_index;
-  });
-  const PoseFrame frame = problem.frame();
-  CsvTable table(names_of(cells_of(records.front(), frame, run)));
+  std::ranges::sort(records, {}, &RegistrationRecord::start_index);
+  std::vector<CsvCells> rows;
   for (const RegistrationRecord& record : records)
-    table.add_row(texts_of(cells_of(record, frame, run)));
-  return table;
+    rows.push_back(cells_of(record, problem.frame(), run));
+  return csv_table(std::move(rows));
 }
 
 namespace {
@@ -399,6 +398,34 @@ void write_pose_files(const RegistrationRecord& record, const std::filesystem::p
   write_text_file(folder / "result.tfm", pose_to_itk_transform(pose));
 }
 
+/// A few lines for a person at the terminal.
+std::string summary_text(const RegistrationRecord& record, const RegistrationProblem& problem) {
+  const RegistrationResult& result = record.result;
+  const PoseFrame frame = problem.frame();
+  std::ostringstream out;
+  out << "start       " << parameters_line(parameters_from_pose(frame, result.start_room_from_ct))
+      << "   (rx, ry, rz, tx, ty, tz from nominal)\n"
+      << "result      " << parameters_line(parameters_from_pose(frame, result.room_from_ct)) << '\n'
+      << "similarity  " << fixed_text(result.similarity, 4) << '\n';
+  if (std::isfinite(record.uncertainty.tre_95_mm) && std::isfinite(record.uncertainty.confidence))
+    out << "uncertain   TRE below " << fixed_text(record.uncertainty.tre_95_mm, 2)
+        << " mm with 95 % probability if the pose is the right one; it is, with a probability of "
+        << fixed_text(std::min(99.9, 100.0 * record.uncertainty.confidence), 1)
+        << " % (docs/uncertainty.md)\n";
+  if (record.errors.has_value())
+    out << "TRE         " << fixed_text(record.errors->initial_tre_mm, 2) << " mm at the start, "
+        << fixed_text(record.errors->tre_mm, 2)
+        << " mm at the end (gold pose: " << record.errors->gold_source << ")\n";
+  if (result.correction.has_value())
+    out << "corrected   " << correction_text(*result.correction) << '\n';
+  out << "stopped     " << to_string(result.stop_reason);
+  if (result.stop_reason == StopReason::StartInadmissible)
+    out << " (" << result.rays_outside << " rays outside the field)";
+  out << " after " << result.evaluations << " poses (" << result.inadmissible << " inadmissible), "
+      << result.drr_count << " DRRs, " << fixed_text(result.seconds, 2) << " s\n";
+  return out.str();
+}
+
 }  // namespace
 
 void write_result_files(const RegistrationRecord& record,
@@ -455,33 +482,6 @@ std::vector<std::string> overlay_file_names(const RegistrationProblem& problem) 
   for (const RegistrationView& view : problem.views)
     names.push_back(file_name_part(view.view.camera.name) + "-overlay.png");
   return names;
-}
-
-std::string summary_text(const RegistrationRecord& record, const RegistrationProblem& problem) {
-  const RegistrationResult& result = record.result;
-  const PoseFrame frame = problem.frame();
-  std::ostringstream out;
-  out << "start       " << parameters_line(parameters_from_pose(frame, result.start_room_from_ct))
-      << "   (rx, ry, rz, tx, ty, tz from nominal)\n"
-      << "result      " << parameters_line(parameters_from_pose(frame, result.room_from_ct)) << '\n'
-      << "similarity  " << fixed_text(result.similarity, 4) << '\n';
-  if (std::isfinite(record.uncertainty.tre_95_mm) && std::isfinite(record.uncertainty.confidence))
-    out << "uncertain   TRE below " << fixed_text(record.uncertainty.tre_95_mm, 2)
-        << " mm with 95 % probability if the pose is the right one; it is, with a probability of "
-        << fixed_text(std::min(99.9, 100.0 * record.uncertainty.confidence), 1)
-        << " % (docs/uncertainty.md)\n";
-  if (record.errors.has_value())
-    out << "TRE         " << fixed_text(record.errors->initial_tre_mm, 2) << " mm at the start, "
-        << fixed_text(record.errors->tre_mm, 2)
-        << " mm at the end (gold pose: " << record.errors->gold_source << ")\n";
-  if (result.correction.has_value())
-    out << "corrected   " << correction_text(*result.correction) << '\n';
-  out << "stopped     " << to_string(result.stop_reason);
-  if (result.stop_reason == StopReason::StartInadmissible)
-    out << " (" << result.rays_outside << " rays outside the field)";
-  out << " after " << result.evaluations << " poses (" << result.inadmissible << " inadmissible), "
-      << result.drr_count << " DRRs, " << fixed_text(result.seconds, 2) << " s\n";
-  return out.str();
 }
 
 }  // namespace af::registration

@@ -3,41 +3,15 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "register/method/registration.h"
-#include "register/uncertainty/uncertainty_report.h"
-#include "register/verdict/verdict.h"
-#include "register/verdict/view_diagnosis.h"
+#include "register/results/registration_columns.h"
+#include "register/uncertainty/registrar.h"
 #include "run/provenance.h"
 #include "text/csv_table.h"
 
 namespace af::registration {
-
-/// Distances of a registration's start and end from the gold pose.
-struct TargetErrors {
-  std::string gold_source;  ///< "fiducials" or "study" (its gold_room_from_ct)
-  double initial_tre_mm = 0.0;
-  double tre_mm = 0.0;
-};
-
-/// One registration among those of a run.
-struct RegistrationRecord {
-  std::int64_t start_index = 0;
-  RegistrationResult result;
-  std::vector<ViewValue> view_values;  ///< of PoseExaminer, at the end
-  UncertaintyReport uncertainty;       ///< of UncertaintyEstimator, likewise
-  ViewDiagnosis diagnosis;             ///< of a run's best record
-  std::optional<TargetErrors> errors;  ///< when the gold pose is known
-
-  /// What the registration itself found; the rest is derived once all records exist.
-  auto members() { return std::tie(start_index, result, view_values, uncertainty); }
-};
-
-/// The verdict on a record: at least doubtful where the diagnosis found something.
-Judgement judgement_of(const RegistrationRecord& record);
 
 /// Order of records by similarity, highest first; those that are not found come after the others,
 /// those without a similarity last, ties go by start index.
@@ -61,6 +35,9 @@ struct RunDescription {
 nlohmann::json result_json(const RegistrationRecord& record,
                            const RegistrationProblem& problem,
                            const RunDescription& run);
+
+/// What a record says of itself into its row: all that needs no gold pose, without the poses.
+void set_result(const RegistrationRecord& record, RegistrationRow& row);
 
 /// registrations.csv with the contract's columns, rows sorted by start index. Parameters are
 /// relative to the nominal pose, which the column `relative_to` says.
@@ -94,8 +71,5 @@ std::string write_run(const std::vector<RegistrationRecord>& records,
 std::vector<std::string> result_file_names();
 /// The pictures that it replaces, one per view.
 std::vector<std::string> overlay_file_names(const RegistrationProblem& problem);
-
-/// A few lines for a person at the terminal.
-std::string summary_text(const RegistrationRecord& record, const RegistrationProblem& problem);
 
 }  // namespace af::registration

@@ -89,11 +89,11 @@ std::string file_page() {
       << "## registrations.csv\n\nOne row per registration, with these columns; `af-evaluate` "
       << "and `--correct` add more between them ([errors.md](../errors.md) defines the "
       << "errors):\n\n"
-      << code_list(names_of(registration_row({}, {}, {})))
-      << "\n\nWith `--correct`: " << code_list(names_of(correction_cells({})))
+      << code_list(columns_of(registration_cells({}, {}, {})))
+      << "\n\nWith `--correct`: " << code_list(columns_of(correction_cells({})))
       << ".\n\nWithout `--no-uncertainty` ([uncertainty.md](../uncertainty.md)): "
-      << code_list(names_of(judge_cells({}))) << ", "
-      << code_list(names_of(uncertainty_cells({}, 0.0))) << ".\n\n"
+      << code_list(columns_of(judge_cells({}))) << ", "
+      << code_list(columns_of(uncertainty_cells({}, 0.0))) << ".\n\n"
       << "## summary.json\n\nIn the folder of a finished run of `af-evaluate`; `af-evaluate "
       << "report` reads it. Numbers that are not known are null.\n\n"
       << "| Key | Of which kinds | What |\n|---|---|---|\n"

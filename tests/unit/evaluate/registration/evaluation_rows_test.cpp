@@ -67,13 +67,13 @@ TEST(RegistrationRows, TravelWithEveryBit) {
 
 TEST(RegistrationRows, OfACorrectionTravelAndHaveColumnsOnlyWhereOneWasWanted) {
   RegistrationRow corrected = row("field", 7, 3.3, 1.0);
-  corrected.is_corrected = true;
-  corrected.correction = {2, 0.25, std::nan(""), true};
+  corrected.correction = registration::CorrectionReport{2, 0.25, std::nan(""), true};
   const RegistrationRow plain = row("raycast", 7, 3.3, 1.0);
   const RegistrationRow received =
       value_of<TracedRow>(bytes_of(TracedRow{corrected, {}}), "journal").row;
-  EXPECT_TRUE(received.is_corrected);
-  EXPECT_FALSE(value_of<TracedRow>(bytes_of(TracedRow{plain, {}}), "journal").row.is_corrected);
+  EXPECT_TRUE(received.correction.has_value());
+  EXPECT_FALSE(
+      value_of<TracedRow>(bytes_of(TracedRow{plain, {}}), "journal").row.correction.has_value());
   const CsvTable table = registrations_table(Rows{received, plain});
   EXPECT_EQ(table.columns().back(), "seconds");
   const std::vector<std::pair<const char*, const char*>> cells = {{"correction_casts", "2"},
@@ -566,12 +566,12 @@ PerturbedStart start_beside(double distance_mm) {
 TEST(RegisteredRow, MeasuresTheEndAgainstBothPoses) {
   const RegistrationRow found = registered_row(
       [](const RigidTransform& start) {
-        registration::RegistrationResult result;
-        result.room_from_ct = start;
-        result.room_from_ct.translation() = Eigen::Vector3d(0, 0, 0.25);
-        result.similarity = 1.5;
-        result.chain = "wide-edges";
-        return result;
+        registration::RegistrationRecord record;
+        record.result.room_from_ct = start;
+        record.result.room_from_ct.translation() = Eigen::Vector3d(0, 0, 0.25);
+        record.result.similarity = 1.5;
+        record.result.chain = "wide-edges";
+        return record;
       },
       start_beside(4.0),
       yardstick_at_origin());
@@ -588,7 +588,7 @@ TEST(RegisteredRow, MeasuresTheEndAgainstBothPoses) {
 
 TEST(RegisteredRow, OfARegistrationThatThrowsIsAFailure) {
   const RegistrationRow found = registered_row(
-      [](const RigidTransform&) -> registration::RegistrationResult {
+      [](const RigidTransform&) -> registration::RegistrationRecord {
         throw NumericError("the histogram is empty");
       },
       start_beside(1.0),
@@ -602,16 +602,19 @@ TEST(RegisteredRow, OfARegistrationThatThrowsIsAFailure) {
 TEST(RegisteredRow, OfAStartThatNeverMovedIsAFailureHoweverCloseItWas) {
   const RegistrationRow found = registered_row(
       [](const RigidTransform& start) {
-        registration::RegistrationResult result;
-        result.room_from_ct = start;
-        result.similarity = std::nan("");
-        result.stop_reason = registration::StopReason::StartInadmissible;
-        return result;
+        registration::RegistrationRecord record;
+        record.result.room_from_ct = start;
+        record.result.similarity = std::nan("");
+        record.result.stop_reason = registration::StopReason::StartInadmissible;
+        // The judge looks at the pose all the same.
+        record.view_values = {{0.5, 0.5}};
+        return record;
       },
       start_beside(1.0),
       yardstick_at_origin());
   EXPECT_EQ(found.stop_reason, "start-inadmissible");
   EXPECT_TRUE(std::isnan(found.tre_mm));
+  EXPECT_TRUE(std::isnan(found.judge.coarse.mean));
 }
 
 TEST(MethodComparison, OfAHandBuiltRunIsTheKnownOne) {

@@ -4,8 +4,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "evaluate/outputs/failed_start.h"
-
 namespace af::evaluation {
 namespace {
 
