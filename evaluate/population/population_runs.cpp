@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "base/error.h"
+#include "evaluate/registration/finished_rows.h"
 #include "evaluate/statistics/patient_names.h"
-#include "text/csv_table.h"
 
 namespace af::evaluation {
 
@@ -19,27 +19,22 @@ using PatientsByRenderer = std::map<std::string, std::map<std::string, PatientOu
 /// Which run has a case by a renderer: a copy of a run would count its starts twice.
 using RunOfCase = std::map<std::pair<std::string, std::string>, std::filesystem::path>;
 
-void add_population_rows(const CsvTable& table,
-                         const std::filesystem::path& run,
-                         RunOfCase& run_of_case,
-                         PatientsByRenderer& found) {
-  for (std::size_t row = 0; row < table.row_count(); ++row) {
-    const std::string& case_name = table.text(row, "case");
-    const std::string& renderer = table.text(row, "renderer");
-    const auto [known, is_new] = run_of_case.emplace(std::pair(renderer, case_name), run);
-    if (!is_new && known->second != run)
-      throw InputError(
-          "--condition",
-          run.string(),
-          "must not have case " + case_name + ", which " + known->second.string() + " has, too");
-    const std::string patient = patient_of_case(case_name);
-    PatientOutcomes& outcomes = found[renderer][patient];
-    outcomes.patient = patient;
-    const double initial_mm = table.number(row, "initial_tre_mm");
-    outcomes.by_tre.push_back({initial_mm, table.number_or_nan(row, "tre_mm")});
-    outcomes.by_mrpd.push_back({initial_mm, table.number_or_nan(row, "mrpd_mm")});
-    outcomes.seconds.push_back(table.number_or_nan(row, "seconds"));
-  }
+void add_population_row(const RegistrationRow& row,
+                        const std::filesystem::path& run,
+                        RunOfCase& run_of_case,
+                        PatientsByRenderer& found) {
+  const auto [known, is_new] = run_of_case.emplace(std::pair(row.renderer, row.case_name), run);
+  if (!is_new && known->second != run)
+    throw InputError(
+        "--condition",
+        run.string(),
+        "must not have case " + row.case_name + ", which " + known->second.string() + " has, too");
+  const std::string patient = patient_of_case(row.case_name);
+  PatientOutcomes& outcomes = found[row.renderer][patient];
+  outcomes.patient = patient;
+  outcomes.by_tre.push_back({row.initial_tre_mm, row.tre_mm});
+  outcomes.by_mrpd.push_back({row.initial_tre_mm, row.errors.mrpd_mm});
+  outcomes.seconds.push_back(row.seconds);
 }
 
 /// Intervals and threshold, which all runs must share.
@@ -58,11 +53,9 @@ PopulationCounting counting_of(const EvaluationRun& run, std::uint64_t seed) {
   }
 }
 
-/// Runs of earlier versions do not say.
 std::string commit_of(const EvaluationRun& run) {
   try {
-    return run.summary.value("provenance", nlohmann::json::object())
-        .value("program_commit", "unknown");
+    return run.summary.at("provenance").at("program_commit").get<std::string>();
   } catch (const nlohmann::json::exception&) {
     throw FileError((run.folder / "summary.json").string(),
                     "provenance",
@@ -83,8 +76,9 @@ void PopulationReader::read(const std::string& condition) {
   for (const EvaluationRun& run : find_runs({condition.substr(equals + 1)})) {
     check_counting(run);
     commits.insert(commit_of(run));
-    run.read_registrations(
-        [&](const CsvTable& part) { add_population_rows(part, run.folder, run_of_case, found); });
+    read_rows(run, [&](const RegistrationRow& row) {
+      add_population_row(row, run.folder, run_of_case, found);
+    });
   }
   if (found.empty())
     throw InputError("--condition", condition, "holds no finished registration run");

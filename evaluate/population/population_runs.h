@@ -17,7 +17,7 @@ namespace af::evaluation {
 struct PopulationCondition {
   std::string name;
   std::vector<PatientOutcomes> patients;
-  /// Of the programs that made the runs; "unknown" of those that do not say.
+  /// Of the programs that made the runs.
   std::set<std::string> commits = {};
 };
 

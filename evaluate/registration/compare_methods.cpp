@@ -52,9 +52,7 @@ void run_compare(const CompareOptions& options,
          {csv, options.output, pairs_csv, distances_csv, patients_csv})
       announce_output(path);
     const std::vector<EvaluationRun> runs = find_runs(options.runs);
-    const std::vector<MethodRow> rows = method_rows(runs);
-    if (rows.empty())
-      throw InputError("RUN", options.runs.front().string(), "holds no finished registration run");
+    const CsvTable methods = methods_table(runs);
     const CsvTable pairs = pairs_table(runs);
     // Of an earlier comparison these would stand in the Markdown.
     for (const std::filesystem::path& path : {pairs_csv, distances_csv, patients_csv})
@@ -68,7 +66,7 @@ void run_compare(const CompareOptions& options,
           patient_distances_table(distances_over_patients(distances, options.equivalence_margin_mm))
               .to_text());
     }
-    write_text_file(csv, methods_table(rows).to_text());
+    write_text_file(csv, methods.to_text());
     std::vector<std::string> arguments = {csv.string()};
     if (options.is_screen) arguments.emplace_back("--screen");
     draw_results(arguments, world);

@@ -3,29 +3,19 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdint>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <utility>
 
-#include "base/error.h"
+#include "evaluate/registration/finished_rows.h"
 #include "evaluate/statistics/patient_names.h"
 #include "geometry/rigid_transform.h"
 #include "gold_standard/target_box.h"
 #include "gold_standard/tre.h"
-#include "pose_files/pose_file.h"
+#include "text/csv_cells.h"
 
 namespace af::evaluation {
 namespace {
-
-using nlohmann::json;
-
-/// What the poses of a case's rows are relative to, and what moves with them.
-struct CaseTarget {
-  PoseFrame gold_frame;
-  std::vector<Eigen::Vector3d> points_ct_mm;
-};
 
 struct EndPose {
   RigidTransform start_room_from_ct;
@@ -43,69 +33,23 @@ struct MethodEnds {
   std::map<std::int64_t, EndPose> ends;  ///< by start index; those with a pose
 };
 
-Eigen::Vector3d point_of(const json& values) {
-  return {values.at(0).get<double>(), values.at(1).get<double>(), values.at(2).get<double>()};
-}
-
-CaseTarget target_of(const json& of_case) {
-  const RigidTransform gold = pose_of_rows(of_case.at("gold_room_from_ct"), "gold_room_from_ct");
-  const json& box = of_case.at("target_box_ct_mm");
-  return {PoseFrame::about(gold, point_of(of_case.at("center_ct_mm"))),
-          target_points({point_of(box.at(0)), point_of(box.at(1))})};
-}
-
-std::map<std::string, CaseTarget> targets_of(const EvaluationRun& run) {
-  const auto unusable = [&] {
-    return FileError(
-        (run.folder / "summary.json").string(),
-        "cases",
-        "gold_room_from_ct, center_ct_mm and target_box_ct_mm of every case",
-        "a run without them (of an earlier version, or damaged); --pose-distances needs them");
-  };
-  std::map<std::string, CaseTarget> targets;
-  try {
-    for (const json& of_case : run.summary.at("cases"))
-      targets[of_case.at("case").get<std::string>()] = target_of(of_case);
-  } catch (const json::exception&) {
-    throw unusable();
-  } catch (const InputError&) {
-    throw unusable();
-  }
-  return targets;
-}
-
-RigidTransform pose_of(const CsvTable& table,
-                       std::size_t row,
-                       const char* prefix,
-                       const PoseFrame& frame) {
-  std::array<double, 6> values{};
-  for (std::size_t i = 0; i < values.size(); ++i)
-    values[i] = table.number_or_nan(row, std::string(prefix) + kParameterNames[i]);
-  return pose_from_parameters(frame, PoseParameters::from_deg_and_mm(values));
-}
-
 std::vector<MethodEnds> ends_of(const EvaluationRun& run) {
-  const std::map<std::string, CaseTarget> targets = targets_of(run);
+  const RunFacts facts = facts_of(run);
   std::map<std::pair<std::string, std::string>, MethodEnds> methods;
-  run.read_registrations([&](const CsvTable& table) {
-    for (std::size_t row = 0; row < table.row_count(); ++row) {
-      const std::string& name = table.text(row, "case");
-      const auto target = targets.find(name);
-      if (target == targets.end())
-        throw FileError((run.folder / "summary.json").string(),
-                        "cases",
-                        "the case '" + name + "' of registrations.csv",
-                        "none of this name");
-      const std::string& renderer = table.text(row, "renderer");
-      MethodEnds& method = methods[{name, renderer}];
-      if (method.run.empty())
-        method = {run.folder.filename().string(), renderer, name, target->second.points_ct_mm, {}};
-      const PoseFrame& frame = target->second.gold_frame;
-      const RigidTransform pose = pose_of(table, row, "final_", frame);
-      if (pose.matrix().allFinite())
-        method.ends[static_cast<std::int64_t>(table.number(row, "start_index"))] = {
-            pose_of(table, row, "start_", frame), pose};
-    }
+  read_rows(run, [&](const RegistrationRow& row) {
+    const FinishedCase& of_case = facts.case_of(row);
+    MethodEnds& method = methods[{row.case_name, row.renderer}];
+    if (method.run.empty())
+      method = {run.folder.filename().string(),
+                row.renderer,
+                row.case_name,
+                target_points(of_case.target_box_ct),
+                {}};
+    const auto pose_of = [&](const std::array<double, 6>& deg_mm) {
+      return pose_from_parameters(of_case.gold_frame, PoseParameters::from_deg_and_mm(deg_mm));
+    };
+    const RigidTransform pose = pose_of(row.final_deg_mm);
+    if (pose.matrix().allFinite()) method.ends[row.start_index] = {pose_of(row.start_deg_mm), pose};
   });
   std::vector<MethodEnds> all;
   all.reserve(methods.size());
@@ -164,36 +108,22 @@ std::vector<PoseDistanceRow> pose_distances(const std::vector<EvaluationRun>& ru
 }
 
 CsvTable pose_distances_table(const std::vector<PoseDistanceRow>& rows) {
-  CsvTable table({"case",
-                  "run_a",
-                  "renderer_a",
-                  "run_b",
-                  "renderer_b",
-                  "starts",
-                  "mean_distance_mm",
-                  "median_distance_mm",
-                  "p95_distance_mm",
-                  "max_distance_mm",
-                  "mean_rotation_deg",
-                  "median_rotation_deg",
-                  "p95_rotation_deg",
-                  "max_rotation_deg"});
-  for (const PoseDistanceRow& row : rows)
-    table.add_row({row.case_name,
-                   row.run_a,
-                   row.renderer_a,
-                   row.run_b,
-                   row.renderer_b,
-                   std::to_string(row.distance_mm.count),
-                   number_text(row.distance_mm.mean),
-                   number_text(row.distance_mm.median),
-                   number_text(row.distance_mm.percentile_95),
-                   number_text(row.distance_mm.maximum),
-                   number_text(row.rotation_deg.mean),
-                   number_text(row.rotation_deg.median),
-                   number_text(row.rotation_deg.percentile_95),
-                   number_text(row.rotation_deg.maximum)});
-  return table;
+  return csv_table(rows, [](const PoseDistanceRow& row) -> CsvCells {
+    return {{"case", row.case_name},
+            {"run_a", row.run_a},
+            {"renderer_a", row.renderer_a},
+            {"run_b", row.run_b},
+            {"renderer_b", row.renderer_b},
+            {"starts", row.distance_mm.count},
+            {"mean_distance_mm", row.distance_mm.mean},
+            {"median_distance_mm", row.distance_mm.median},
+            {"p95_distance_mm", row.distance_mm.percentile_95},
+            {"max_distance_mm", row.distance_mm.maximum},
+            {"mean_rotation_deg", row.rotation_deg.mean},
+            {"median_rotation_deg", row.rotation_deg.median},
+            {"p95_rotation_deg", row.rotation_deg.percentile_95},
+            {"max_rotation_deg", row.rotation_deg.maximum}};
+  });
 }
 
 std::vector<PatientDistances> distances_over_patients(const std::vector<PoseDistanceRow>& rows,
@@ -227,38 +157,23 @@ std::vector<PatientDistances> distances_over_patients(const std::vector<PoseDist
 }
 
 CsvTable patient_distances_table(const std::vector<PatientDistances>& methods) {
-  CsvTable table({"run_a",
-                  "renderer_a",
-                  "run_b",
-                  "renderer_b",
-                  "patients",
-                  "starts",
-                  "mean_distance_mm",
-                  "bootstrap_low_mm",
-                  "bootstrap_high_mm",
-                  "student_low_mm",
-                  "student_high_mm",
-                  "margin_mm",
-                  "p",
-                  "claim"});
-  for (const PatientDistances& method : methods) {
+  return csv_table(methods, [](const PatientDistances& method) -> CsvCells {
     const CaseEquivalence& found = method.equivalence;
-    table.add_row({method.run_a,
-                   method.renderer_a,
-                   method.run_b,
-                   method.renderer_b,
-                   std::to_string(found.cases),
-                   std::to_string(method.starts),
-                   number_text(found.mean),
-                   number_text(found.bootstrap.low),
-                   number_text(found.bootstrap.high),
-                   number_text(found.student.low),
-                   number_text(found.student.high),
-                   number_text(found.margin),
-                   number_text(found.p),
-                   claim_of(found)});
-  }
-  return table;
+    return {{"run_a", method.run_a},
+            {"renderer_a", method.renderer_a},
+            {"run_b", method.run_b},
+            {"renderer_b", method.renderer_b},
+            {"patients", found.cases},
+            {"starts", method.starts},
+            {"mean_distance_mm", found.mean},
+            {"bootstrap_low_mm", found.bootstrap.low},
+            {"bootstrap_high_mm", found.bootstrap.high},
+            {"student_low_mm", found.student.low},
+            {"student_high_mm", found.student.high},
+            {"margin_mm", found.margin},
+            {"p", found.p},
+            {"claim", claim_of(found)}};
+  });
 }
 
 }  // namespace af::evaluation

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluate/sweeps/make_error_budget.h"
 
-#include <array>
 #include <iostream>
 #include <sstream>
 
 #include "base/error.h"
 #include "evaluate/outputs/sample_summary_json.h"
-#include "evaluate/report/evaluation_run.h"
+#include "evaluate/registration/finished_rows.h"
 #include "evaluate/report/report_program.h"
 #include "evaluate/statistics/success_rate.h"
 #include "evaluate/sweeps/error_budget.h"
@@ -17,7 +16,7 @@
 #include "run/provenance.h"
 #include "study/case_gold_standard.h"
 #include "study/study_file.h"
-#include "text/csv_table.h"
+#include "text/csv_cells.h"
 #include "text/options_toml.h"
 
 namespace af::evaluation {
@@ -32,14 +31,6 @@ struct ChainRun {
   BudgetRun budget;
 };
 
-std::optional<PoseParameters> end_of(const CsvTable& table, std::size_t row) {
-  if (table.text(row, "success") != "1") return std::nullopt;
-  std::array<double, 6> values{};
-  for (std::size_t i = 0; i < values.size(); ++i)
-    values[i] = table.number(row, std::string("final_") + kParameterNames[i]);
-  return PoseParameters::from_deg_and_mm(values);
-}
-
 ChainRun read_run(const std::string& step) {
   const std::size_t equals = step.find('=');
   if (equals == std::string::npos || equals == 0)
@@ -50,10 +41,13 @@ ChainRun read_run(const std::string& step) {
   const EvaluationRun& files = found.front();
   if (files.summary.at("cases").size() != 1 || files.summary.at("renderers").size() != 1)
     throw InputError("--step", step, "must be of one case and one renderer");
-  const CsvTable table = CsvTable::read(files.folder / "registrations.csv");
+  const double success_tre_mm = facts_of(files).success_tre_mm;
   BudgetRun budget = {step.substr(0, equals), {}};
-  for (std::size_t row = 0; row < table.row_count(); ++row)
-    budget.ends.push_back(end_of(table, row));
+  read_rows(files, [&](const RegistrationRow& row) {
+    budget.ends.push_back(row.is_success(success_tre_mm)
+                              ? std::optional(PoseParameters::from_deg_and_mm(row.final_deg_mm))
+                              : std::nullopt);
+  });
   return {files, read_text_file(files.folder / "starts.csv"), budget};
 }
 
@@ -96,26 +90,18 @@ json step_json(const BudgetStep& step) {
 }
 
 CsvTable budget_table(const ErrorBudget& budget) {
-  std::vector<std::string> columns = {"step",
-                                      "starts",
-                                      "successes",
-                                      "shift_mm",
-                                      "shift_standard_error_mm",
-                                      "bias_mm",
-                                      "scatter_mm",
-                                      "tre_mm"};
-  for (const char* name : kParameterNames) columns.push_back(std::string("mean_") + name);
-  CsvTable table(columns);
-  for (const BudgetStep& step : budget.steps) {
-    std::vector<std::string> fields = {
-        step.label, std::to_string(step.starts), std::to_string(step.successes)};
-    for (const double value :
-         {step.shift_mm, step.shift_standard_error_mm, step.bias_mm, step.scatter_mm, step.tre_mm})
-      fields.push_back(number_text(value));
-    for (const double value : step.mean_end.deg_and_mm()) fields.push_back(number_text(value));
-    table.add_row(std::move(fields));
-  }
-  return table;
+  return csv_table(budget.steps, [](const BudgetStep& step) {
+    CsvCells cells = {{"step", step.label},
+                      {"starts", step.starts},
+                      {"successes", step.successes},
+                      {"shift_mm", step.shift_mm},
+                      {"shift_standard_error_mm", step.shift_standard_error_mm},
+                      {"bias_mm", step.bias_mm},
+                      {"scatter_mm", step.scatter_mm},
+                      {"tre_mm", step.tre_mm}};
+    append("mean_", kParameterNames, step.mean_end.deg_and_mm(), cells);
+    return cells;
+  });
 }
 
 /// The gold standard's own error, of the chain's last run that has fiducials.
@@ -129,13 +115,11 @@ json gold_of(const std::vector<ChainRun>& runs) {
 }
 
 json summary_json(const std::vector<ChainRun>& runs, const ErrorBudget& budget) {
-  json summary = {{"format", "attenuation-fields evaluation"},
-                  {"format_version", 1},
-                  {"kind", "error-budget"},
-                  {"case", runs.front().files.summary.at("cases").front().at("case")},
-                  {"method", runs.back().files.summary.at("method")},
-                  {"common_starts", budget.common_starts},
-                  {"gold", gold_of(runs)}};
+  json summary = summary_of_kind("error-budget");
+  summary["case"] = runs.front().files.summary.at("cases").front().at("case");
+  summary["method"] = runs.back().files.summary.at("method");
+  summary["common_starts"] = budget.common_starts;
+  summary["gold"] = gold_of(runs);
   for (const BudgetStep& step : budget.steps) summary["steps"].push_back(step_json(step));
   return summary;
 }

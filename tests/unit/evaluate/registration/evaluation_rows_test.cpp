@@ -617,6 +617,21 @@ TEST(RegisteredRow, OfAStartThatNeverMovedIsAFailureHoweverCloseItWas) {
   EXPECT_TRUE(std::isnan(found.judge.coarse.mean));
 }
 
+/// A run of one case whose gold pose turns the CT by a right angle about z.
+EvaluationRun run_with_ends(const test::ScratchFolder& folder, const Rows& rows) {
+  write_text_file(folder / "registrations.csv", registrations_table(rows).to_text());
+  EvaluationRun run{folder.path(), {}};
+  const json gold = {{0, -1, 0, 5}, {1, 0, 0, 6}, {0, 0, 1, 7}, {0, 0, 0, 1}};
+  run.summary["cases"] = json::array({{{"case", "skull"},
+                                       {"gold_room_from_ct", gold},
+                                       {"center_ct_mm", {1, 2, 3}},
+                                       {"target_box_ct_mm", {{-9, -8, -7}, {11, 12, 13}}}}});
+  run.summary["success_tre_mm"] = kSuccessTreMm;
+  run.summary["method"] = {{"preset", "fast"}, {"similarity", "gc"}, {"optimizer", "gradient"}};
+  run.summary["renderers"] = json::array({renderer_statistics(rows, "field", {8, 2.0})});
+  return run;
+}
+
 TEST(MethodComparison, OfAHandBuiltRunIsTheKnownOne) {
   const test::ScratchFolder folder;
   Rows rows = {row("field", 0, 1, 0.2),
@@ -629,29 +644,23 @@ TEST(MethodComparison, OfAHandBuiltRunIsTheKnownOne) {
   rows[4].final_deg_mm = {0, 0, 0, 0, 3, 0};
   for (RegistrationRow& each : rows) each.drr_count = 100 + each.start_index;
   rows[0].errors.mrpd_mm = 0.1;
-  write_text_file(folder / "registrations.csv", registrations_table(rows).to_text());
-  EvaluationRun run{folder.path(), {}};
-  run.summary["method"] = {{"preset", "fast"}, {"similarity", "gc"}, {"optimizer", "gradient"}};
-  const std::vector<MethodRow> found = method_rows({run});
-  ASSERT_EQ(found.size(), 1u);
-  const MethodRow& method = found.front();
-  EXPECT_EQ(method.method, "fast gc gradient");
-  EXPECT_EQ(method.starts, 5);
-  EXPECT_EQ(method.bands[0].successes, 2);
-  EXPECT_EQ(method.bands[0].trials, 2);
-  EXPECT_EQ(method.bands[1].successes, 0);
-  EXPECT_EQ(method.bands[1].trials, 1);  // 8 mm belongs to the band that begins there
-  EXPECT_EQ(method.bands[2].trials, 1);  // 31 mm lies beyond all
-  EXPECT_DOUBLE_EQ(method.mean_tre_mm, 0.3);
-  EXPECT_DOUBLE_EQ(method.median_tre_mm, 0.3);
-  EXPECT_DOUBLE_EQ(method.translation_bias_mm, 2.0);
-  EXPECT_DOUBLE_EQ(method.rotation_bias_deg, std::hypot(0.1, 0.2));
-  EXPECT_EQ(method.median_drr_count, 102.0);
-  EXPECT_EQ(method.median_seconds, 0.2);
-  const CsvTable table = methods_table(found);
+  const CsvTable table = methods_table({run_with_ends(folder, rows)});
+  ASSERT_EQ(table.row_count(), 1u);
+  EXPECT_EQ(table.text(0, "method"), "fast gc gradient");
   EXPECT_EQ(table.text(0, "optimizer"), "gradient");
-  EXPECT_EQ(table.text(0, "gross_failures"), "1");  // the one without a pose
+  EXPECT_EQ(table.text(0, "starts"), "5");
   EXPECT_EQ(table.text(0, "successes_0_8_mm"), "2");
+  EXPECT_EQ(table.text(0, "starts_0_8_mm"), "2");
+  EXPECT_EQ(table.text(0, "successes_8_16_mm"), "0");
+  EXPECT_EQ(table.text(0, "starts_8_16_mm"), "1");   // 8 mm belongs to the band that begins there
+  EXPECT_EQ(table.text(0, "starts_16_30_mm"), "1");  // 31 mm lies beyond all
+  EXPECT_DOUBLE_EQ(table.number(0, "mean_tre_mm"), 0.3);
+  EXPECT_DOUBLE_EQ(table.number(0, "median_tre_mm"), 0.3);
+  EXPECT_DOUBLE_EQ(table.number(0, "translation_bias_mm"), 2.0);
+  EXPECT_DOUBLE_EQ(table.number(0, "rotation_bias_deg"), std::hypot(0.1, 0.2));
+  EXPECT_EQ(table.number(0, "median_drr_count"), 102.0);
+  EXPECT_EQ(table.number(0, "median_seconds"), 0.2);
+  EXPECT_EQ(table.text(0, "gross_failures"), "1");  // the one without a pose
   // Wilson's interval of 2 of 2 begins at 2 / (2 + 1.96^2).
   EXPECT_NEAR(table.number(0, "wilson_low_0_8_mm"), 0.34, 5e-3);
   EXPECT_EQ(table.number(0, "mrpd_successes"), 1.0);
@@ -663,30 +672,16 @@ TEST(MethodComparison, TakesThresholdTargetAndCaptureRangeFromTheSummary) {
   rows[0].start_deg_mm = {0, 0, 0, 0, 1, 0};  // a translation
   rows[1].start_deg_mm = {1, 0, 0, 0, 0, 0};  // a rotation
   for (RegistrationRow& each : rows) each.final_deg_mm = {};
-  write_text_file(folder / "registrations.csv", registrations_table(rows).to_text());
-  EvaluationRun run{folder.path(), {}};
+  EvaluationRun run = run_with_ends(folder, rows);
   run.summary["success_tre_mm"] = 1.0;
-  run.summary["cases"] = json::array({{{"case", "skull"},
-                                       {"center_ct_mm", {0, 0, 0}},
-                                       {"target_box_ct_mm", {{-9, -9, -9}, {9, 9, 9}}}}});
+  run.summary["cases"][0]["center_ct_mm"] = {0, 0, 0};
+  run.summary["cases"][0]["target_box_ct_mm"] = {{-9, -9, -9}, {9, 9, 9}};
   run.summary["renderers"] = json::array({renderer_statistics(rows, "field", {8, 2.0, 1, 1.0})});
-  const MethodRow method = method_rows({run}).front();
-  EXPECT_EQ(method.bands[0].successes, 1);
-  EXPECT_EQ(method.rotation_shares[0], 0.5);
-  EXPECT_EQ(method.capture_range_mm, "0");
-  EXPECT_EQ(method.gross_failures, 0);
-}
-
-/// A run of one case whose gold pose turns the CT by a right angle about z.
-EvaluationRun run_with_ends(const test::ScratchFolder& folder, const Rows& rows) {
-  write_text_file(folder / "registrations.csv", registrations_table(rows).to_text());
-  EvaluationRun run{folder.path(), {}};
-  const json gold = {{0, -1, 0, 5}, {1, 0, 0, 6}, {0, 0, 1, 7}, {0, 0, 0, 1}};
-  run.summary["cases"] = json::array({{{"case", "skull"},
-                                       {"gold_room_from_ct", gold},
-                                       {"center_ct_mm", {1, 2, 3}},
-                                       {"target_box_ct_mm", {{-9, -8, -7}, {11, 12, 13}}}}});
-  return run;
+  const CsvTable table = methods_table({run});
+  EXPECT_EQ(table.text(0, "successes_0_8_mm"), "1");
+  EXPECT_EQ(table.number(0, "rotation_share_0_8_mm"), 0.5);
+  EXPECT_EQ(table.text(0, "capture_range_mm"), "0");
+  EXPECT_EQ(table.text(0, "gross_failures"), "0");
 }
 
 TEST(PoseDistances, OfTwoRunsAreThoseOfTheirEndsFromTheSameStarts) {
@@ -801,10 +796,18 @@ TEST(PoseDistances, OfARunThatStatesNoTargetAreAFileError) {
 
 TEST(MethodComparison, OfARunWithoutSuccessHasNoErrors) {
   const test::ScratchFolder folder;
-  write_text_file(folder / "registrations.csv",
-                  registrations_table(Rows{row("field", 0, 1, 5.0)}).to_text());
-  const MethodRow method = method_rows({EvaluationRun{folder.path(), json::object()}}).front();
-  EXPECT_TRUE(std::isnan(method.mean_tre_mm));
+  const CsvTable table = methods_table({run_with_ends(folder, {row("field", 0, 1, 5.0)})});
+  EXPECT_EQ(table.text(0, "mean_tre_mm"), "nan");
+}
+
+TEST(MethodComparison, OfASummaryThatLacksAFactIsAFileError) {
+  const test::ScratchFolder folder;
+  const EvaluationRun whole = run_with_ends(folder, {row("field", 0, 1, 0.2)});
+  for (const char* key : {"success_tre_mm", "cases", "method", "renderers"}) {
+    EvaluationRun run = whole;
+    run.summary.erase(key);
+    EXPECT_THROW(methods_table({run}), FileError) << key;
+  }
 }
 
 TEST(MethodComparison, PairsAreThoseOfTheSummary) {

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// Finished registration runs as those who compare them read them.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <string>
+
+#include "evaluate/registration/registration_rows.h"
+#include "evaluate/report/evaluation_run.h"
+#include "geometry/rigid_transform.h"
+#include "geometry/slab_sizing.h"
+
+namespace af::evaluation {
+
+/// A case as its run's summary states it.
+struct FinishedCase {
+  PoseFrame gold_frame;  ///< what the poses of its rows are relative to
+  CtBox target_box_ct;   ///< what distances are means over
+};
+
+/// What is needed to read a run's rows.
+struct RunFacts {
+  std::string summary_path;
+  double success_tre_mm = 0.0;
+  std::map<std::string, FinishedCase> cases;
+
+  /// FileError when the summary has no such case.
+  [[nodiscard]] const FinishedCase& case_of(const RegistrationRow& row) const;
+};
+
+/// FileError when the summary does not state them.
+RunFacts facts_of(const EvaluationRun& run);
+
+/// Calls `receive` with the rows of registrations.csv in order: case, renderer, start index, poses,
+/// TREs, mRPD, error of the rotation, DRRs and seconds; the rest is left as it is without a
+/// registration. FileError when one of these is missing or no number.
+void read_rows(const EvaluationRun& run,
+               const std::function<void(const RegistrationRow& row)>& receive);
+
+}  // namespace af::evaluation
