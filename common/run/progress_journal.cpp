@@ -142,15 +142,6 @@ UnfinishedWork read_manifest(const fs::path& path, std::int64_t least_unit_size)
   }
 }
 
-/// The files in which programs before this format kept a field's units.
-std::vector<fs::path> files_of_older_programs(const fs::path& folder) {
-  std::vector<fs::path> found;
-  for (const auto& entry : fs::directory_iterator(folder))
-    if (entry.path().filename() == "manifest.json" || entry.path().extension() == ".shard")
-      found.push_back(entry.path());
-  return found;
-}
-
 /// Stands beside the manifest when the options of the work were refused.
 fs::path refused_path(const JournalFiles& files) {
   return files.folder / (files.name + ".refused");
@@ -223,11 +214,6 @@ ProgressJournal::ProgressJournal(const UnfinishedWork& work)
 }
 
 void ProgressJournal::open(const UnfinishedWork& work) {
-  if (work.restarts)
-    for (const fs::path& older : files_of_older_programs(files_.folder)) fs::remove_all(older);
-  else if (!work.gives_way && !files_of_older_programs(files_.folder).empty())
-    throw FileError(files_.folder.string(),
-                    "holds unfinished work of an older program: start over with --restart");
   const bool goes_on = !work.restarts && is_there(files_.manifest()) && takes_over(work);
   fs::remove_all(refused_path(files_));
   if (goes_on) {

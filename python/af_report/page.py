@@ -50,8 +50,8 @@ def page(runs, output, title):
         style, script = (Markup((FOLDER / name).read_text(encoding="utf-8")) for name in ("page.css", "page.js"))
         return environment.get_template("page.html").render(
             title=title or default_title(runs), style=style, script=script, findings=findings,
-            version=runs[0].summary["provenance"].get("program_version", ""),
-            date=str(runs[0].summary["provenance"].get("started_utc", ""))[:10],
+            version=runs[0].summary["provenance"]["program_version"],
+            date=runs[0].summary["provenance"]["started_utc"][:10],
             tiles=registration.tiles(registrations[0]) if registrations else [],
             overview=registration.overview(registrations) if registrations else None,
             comparison=registration.comparison(registrations) if registrations else None, caution=provenance.caution(registrations),

@@ -109,13 +109,13 @@ def provenance(runs):
     blocks = []
     for run in runs:
         found = run.summary["provenance"]
-        host, link = found.get("host") or {}, run.link("reproduce.sh")
-        hashes = Markup("<br>").join(Markup('%s <span class="hash">%s</span>') % pair for pair in (found.get("input_sha256") or {}).items())
+        host, link = found["host"], run.link("reproduce.sh")
+        hashes = Markup("<br>").join(Markup('%s <span class="hash">%s</span>') % pair for pair in found["input_sha256"].items())
         blocks += [heading(f"{TITLES[run.kind]}: {run.name}"), Terms([
-            ("Program", f"{found.get('program')} {found.get('program_version')}, commit {found.get('program_commit', 'unknown')}"),
-            ("Started (UTC)", str(found.get("started_utc", "–"))),
-            ("Compiler, processor", f"{found.get('compiler')}, {host.get('cpu', 'unknown')} ({whole(host.get('vector_bits'))}-bit vectors)"),
-            ("Ranks", whole(found.get("rank_count"))), ("Seed", whole(found.get("seed"))), ("Inputs, SHA-256", hashes or "–"),
+            ("Program", f"{found['program']} {found['program_version']}, commit {found['program_commit']}"),
+            ("Started (UTC)", found["started_utc"]),
+            ("Compiler, processor", f"{found['compiler']}, {host['cpu']} ({whole(host['vector_bits'])}-bit vectors)"),
+            ("Ranks", whole(found["rank_count"])), ("Seed", whole(found["seed"])), ("Inputs, SHA-256", hashes or "–"),
             ("Script that repeats it", Markup('<a href="%s">%s</a>') % (link, link))]),
-            Text(str(found.get("command_line", "")), "pre"), Text(str(found.get("options_toml", "")), "pre")]
+            Text(found["command_line"], "pre"), Text(found["options_toml"], "pre")]
     return Section("provenance", "Provenance", blocks)

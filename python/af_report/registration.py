@@ -18,10 +18,10 @@ MOST_CURVES = 6
 
 def method_text(run, renderer):
     """attenuation fields, robust: ncc, gc, rg; the name alone for another program's poses."""
-    name, method = renderer["renderer"], run.summary.get("method") or {}
+    name, method = renderer["renderer"], run.summary["method"]
     if name not in ("field", "raycast"):
         return name
-    parts = [method.get("preset"), method.get("similarity"), method.get("optimizer"), "corrected" if method.get("corrected") else ""]
+    parts = [method["preset"], method["similarity"], method["optimizer"], "corrected" if method.get("corrected") else ""]
     return f"{method_name(name)}: {'; '.join(part for part in parts if part)}"
 
 
@@ -45,8 +45,8 @@ def confidence_text(renderer):
 
 def own_captures(renderer):
     """Of the patients' own capture ranges the mean, the smallest and the largest, and intervals of the mean."""
-    own = renderer["over_cases"].get("capture_range_mm")
-    if not own or own["cases"] < 2:
+    own = renderer["over_cases"]["capture_range_mm"]
+    if own["cases"] < 2:
         return capture(renderer["capture_range"])
     text = f"{'at least ' if own['at_least'] else ''}{three(own['mean_mm'])} mm ({three(own['min_mm'])} to {three(own['max_mm'])}"
     if own["low"] is not None:
@@ -77,7 +77,7 @@ def tiles(run):
     """Success, error, time and confidence of the first method."""
     first, of_view = run.summary["renderers"][0], " by mRPD" if run.has_one_view else ""
     who = method_name(first["renderer"])
-    gold = first.get("gold_uncertainty_mm")
+    gold = first["gold_uncertainty_mm"]
     confident, _, wrong = confidence_text(first).removeprefix("right ").partition(", ")
     return [(percent(success_of(run, first)["rate"]), f"of {whole(success_of(run, first)['starts'])} starts succeed{of_view}", f"{run.name}: {who}"),
             (f"{three(errors_of(run, first)['mean'])} mm", f"mean {'mRPD' if of_view else 'TRE'} of successes",
@@ -88,7 +88,7 @@ def tiles(run):
 
 def findings(run):
     """How far the first method's starts may lie, and how long the others take."""
-    first, paired = run.summary["renderers"][0], run.summary.get("field_against_raycast")
+    first, paired = run.summary["renderers"][0], run.summary["field_against_raycast"]
     items = [f"Capture range with {method_name(first['renderer'])}: "
              f"{capture(first['mrpd_capture_range'] if run.has_one_view else first['capture_range'])}."]
     if run.has_one_view:
@@ -113,7 +113,7 @@ def draws_text(rule):
 def draws_of(cases, place):
     """How the starts of an interval were drawn over all cases, as far as that is known."""
     def known(key):
-        values = [as_number(case.get(key, [])[place]) for case in cases if place < len(case.get(key, []))]
+        values = [as_number(case[key][place]) for case in cases if place < len(case[key])]
         return [value for value in values if math.isfinite(value)]
 
     draws, refused, shares = (known(key) for key in ("draws_per_interval", "inadmissible_draws_per_interval", "rotation_share_per_interval"))
@@ -134,21 +134,21 @@ def success_table(summary):
             rows.append([f"{whole(first['low_mm'])}–{whole(first['high_mm'])}", method_name(renderer["renderer"]), whole(entry["starts"]),
                          whole(entry["successes"]), shown, *draws_of(summary["cases"], place)])
     return Table(["Initial TRE (mm)", "Method", "#Starts", "#Succeeded", "Rate (95 % interval)", "#Draws refused", "#Share of rotation"],
-                 rows, f"Success per interval of initial error, with Wilson intervals. {draws_text(summary.get('start_rule'))}")
+                 rows, f"Success per interval of initial error, with Wilson intervals. {draws_text(summary['start_rule'])}")
 
 
 def capture_table(renderers):
     rows = []
     for renderer in renderers:
-        found, pooled = renderer["capture_range"], renderer["over_cases"].get("pooled_capture_range_mm") or {}
+        found, pooled = renderer["capture_range"], renderer["over_cases"]["pooled_capture_range_mm"]
         together = capture(found)
-        if pooled.get("low") is not None:
+        if pooled["low"] is not None:
             together += f" ({three(pooled['low'])}–{three(pooled['high'])})"
         end = (found or {}).get("end_interval")
         ended = "–" if not end else f"{whole(end['low_mm'])}–{whole(end['high_mm'])} mm: " + (
             f"{whole(end['successes'])} of {whole(end['starts'])}" if end["starts"] else "no starts")
-        rows.append([method_name(renderer["renderer"]), own_captures(renderer), together, ended, capture(renderer.get("mrpd_capture_range")),
-                     capture(renderer.get("cumulative_capture_range"))])
+        rows.append([method_name(renderer["renderer"]), own_captures(renderer), together, ended, capture(renderer["mrpd_capture_range"]),
+                     capture(renderer["cumulative_capture_range"])])
     return Table(["Method", "Patients' own ranges: mean (smallest to largest; 95 %)", "All starts together (95 % over patients)", "Ended by",
                   "By mRPD, all starts", "Cumulative"], rows,
                  "Capture range: the first interval of initial error with a success below 95 % ends it (van de Kraats et al. 2005). "
@@ -162,7 +162,7 @@ def error_table(renderers):
         rows.append([method_name(renderer["renderer"]), whole(renderer["starts"]), three(everything["median"]),
                      f"{three(everything['q1'])}–{three(everything['q3'])}", three(everything["p95"]), three(renderer["tre_mm"]["max"]),
                      whole(renderer["without_pose"]), f"{three(good['mean'])} ± {three(good['sd'])}",
-                     three(renderer["stated_pose_tre_of_successes_mm"]["mean"]), three(renderer.get("gold_uncertainty_mm"))])
+                     three(renderer["stated_pose_tre_of_successes_mm"]["mean"]), three(renderer["gold_uncertainty_mm"])])
     return Table(["Method", "#Starts", "#Median", "#Quartiles", "#95th percentile", "#Largest with a pose", "#No pose",
                   "#Mean ± SD of successes", "#Same against stated pose", "#Gold standard by itself"], rows,
                  "TRE in mm over all registrations, one without a pose counting as infinitely far; then over successes only")
@@ -265,7 +265,7 @@ def paired_text(paired):
 
 def case_table(renderers):
     rows = [[entry["case"], method_name(renderer["renderer"]), whole(entry["starts"]), rate(entry), capture(entry["capture_range"]),
-             three(entry["tre_of_successes_mm"]["mean"]), three(entry.get("gold_uncertainty_mm")), milliseconds(entry["seconds"]["median"]),
+             three(entry["tre_of_successes_mm"]["mean"]), three(entry["gold_uncertainty_mm"]), milliseconds(entry["seconds"]["median"]),
              three(entry["evaluations"]["median"])] for renderer in renderers for entry in renderer["cases"]]
     return Table(["Case", "Method", "#Starts", "#Success (95 % interval)", "#Capture range", "#Mean TRE of successes (mm)",
                   "#Gold standard by itself (mm)", "#Median ms", "#Median evaluations"], rows,
@@ -299,7 +299,7 @@ def section(run, title):
     limit = three(summary["success_tre_mm"])
     blocks = [Text("One start of another run, repeated alone." if alone else "Starts are poses about the gold pose at stated initial target "
                    "registration errors (TRE), the same for every method.")]
-    problems = [*summary.get("row_problems", []), *summary.get("warnings", [])]
+    problems = [*summary["row_problems"], *summary["warnings"]]
     if problems:
         blocks += [Text("What to mind:"), Items(problems)]
     drawn = [run_figure(run, "success-rate", "Success rate per interval of initial error", Markup(
@@ -314,11 +314,11 @@ def section(run, title):
             "<b>Verdict and confidence against the error.</b> Right ends belong to the lower right; crosses are ends that the verdict calls "
             "not found.")))
     blocks += [Figures(drawn), success_table(summary), capture_table(renderers), error_table(renderers), threshold_table(renderers)]
-    if any(case.get("views") == 1 for case in summary["cases"]):
+    if any(case["views"] == 1 for case in summary["cases"]):
         blocks.append(Text(Markup("%s A single view hardly shows the depth along its rays, so a TRE says little; the reprojection distance "
                                   "(mRPD) measures what the view can show.") % strong("One view.")))
     blocks += [confidence_table(renderers), other_errors_table(renderers), *over_patients(renderers),
-               paired_text(summary.get("field_against_raycast")), case_table(renderers), gold_table(summary["cases"]), heading("Failures"),
+               paired_text(summary["field_against_raycast"]), case_table(renderers), gold_table(summary["cases"]), heading("Failures"),
                reason_table(renderers), *failures(run), *pictures(run)]
     return Section(run.anchor, title, [block for block in blocks if block])
 

@@ -59,12 +59,12 @@ class Run:
 
     @property
     def has_one_view(self):
-        cases = self.summary.get("cases", [])
-        return bool(cases) and all(case.get("views") == 1 for case in cases)
+        cases = self.summary["cases"]
+        return bool(cases) and all(case["views"] == 1 for case in cases)
 
     def is_default(self, renderer):
-        method = self.summary.get("method") or {}
-        return renderer["renderer"] == "field" and method.get("preset") == "robust" and not method.get("corrected")
+        method = self.summary["method"]
+        return renderer["renderer"] == "field" and method["preset"] == "robust" and not method.get("corrected")
 
 
 def file_name_part(name):
@@ -146,8 +146,8 @@ def field_name(run):
 def is_papers_setting(run):
     """Whether the paper's PSNR levels hold for the field: its motion range and camera."""
     field = run.summary["field"]
-    stated = [*(field.get("detector_px") or []), *(field.get("pixel_spacing_mm") or []), field.get("source_detector_mm"),
-              field.get("max_rotation_deg"), field.get("max_translation_mm")]
+    stated = [*field["detector_px"], *field["pixel_spacing_mm"], field["source_detector_mm"], field["max_rotation_deg"],
+              field["max_translation_mm"]]
     papers = [256, 256, 1.190625, 1.190625, 1020, 10, 100]
-    return (run.summary.get("has_fitted_viewpoints") is not True and len(stated) == len(papers)
+    return (run.summary.get("has_fitted_viewpoints") is not True
             and all(abs(as_number(value) - paper) <= 1e-3 * paper for value, paper in zip(stated, papers)))

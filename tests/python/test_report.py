@@ -129,8 +129,8 @@ class Pages(Copied):
     def test_begin_with_the_default_method(self):
         other = self.folder / "another"
         shutil.copytree(self.folder / "registration", other)
-        self.change("another", lambda summary: summary.update(method={"preset": "paper"}))
-        self.change("registration", lambda summary: summary.update(method={"preset": "robust"}))
+        self.change("another", lambda summary: summary["method"].update(preset="paper"))
+        self.change("registration", lambda summary: summary["method"].update(preset="robust"))
         found = runs.find_runs([self.folder])
         self.assertEqual([run.name for run in found[:2]], ["registration", "another"])
         table = registration.overview(found[:2])

@@ -215,23 +215,6 @@ TEST(ProgressJournal, RefusesOtherDecisionsAndNamesThem) {
   }
 }
 
-TEST(ProgressJournal, RefusesUnfinishedWorkOfOlderPrograms) {
-  const test::ScratchFolder folder;
-  std::filesystem::create_directories(folder / "p");
-  std::ofstream(folder / "p" / "manifest.json") << "{}";
-  std::ofstream(folder / "p" / "000000-000000.shard") << "units";
-  try {
-    ProgressJournal(work_in(folder / "p"));
-    FAIL() << "accepted";
-  } catch (const FileError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("older program: start over with --restart"));
-  }
-  UnfinishedWork restarted = work_in(folder / "p");
-  restarted.restarts = true;
-  EXPECT_EQ(finished(ProgressJournal(restarted)).size(), 0u);
-  EXPECT_FALSE(std::filesystem::exists(folder / "p" / "manifest.json"));
-}
-
 TEST(ProgressJournal, WorkThatGivesWayIsThrownAwayWhenItsManifestCannotBeRead) {
   const test::ScratchFolder folder;
   three_records(folder / "p");
