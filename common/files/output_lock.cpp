@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "files/output_lock.h"
 
-#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cerrno>
@@ -11,7 +10,6 @@
 #include <fstream>
 #include <mutex>
 #include <set>
-#include <sstream>
 #include <string>
 #include <sys/stat.h>
 #include <system_error>
@@ -29,20 +27,11 @@ namespace fs = std::filesystem;
 
 std::atomic<bool> works_without_locks = false;
 
-std::string text_of_environment(const char* name) {
-  const char* const value = std::getenv(name);
-  return value == nullptr ? "" : value;
-}
-
-/// The batch job, with its task where it is one of an array.
+/// The batch job; empty without a batch system.
 std::string batch_job() {
-  const std::string array = text_of_environment("SLURM_ARRAY_JOB_ID");
-  const std::string slurm = array.empty()
-                                ? text_of_environment("SLURM_JOB_ID")
-                                : array + "_" + text_of_environment("SLURM_ARRAY_TASK_ID");
-  if (!slurm.empty()) return "slurm " + slurm;
-  const std::string pbs = text_of_environment("PBS_JOBID");
-  return pbs.empty() ? "" : "pbs " + pbs;
+  for (const char* name : {"SLURM_JOB_ID", "PBS_JOBID"})
+    if (const char* const value = std::getenv(name)) return value;
+  return {};
 }
 
 std::string time_text() {
@@ -54,60 +43,42 @@ std::string time_text() {
   return text.data();
 }
 
-std::string own_command() {
-  std::ifstream file("/proc/self/cmdline", std::ios::binary);
-  std::string command;
-  std::getline(file, command, '\n');
-  for (char& character : command)
-    if (character == '\0') character = ' ';
-  while (!command.empty() && command.back() == ' ') command.pop_back();
-  constexpr std::size_t kLongest = 500;
-  return command.substr(0, kLongest);
+/// The parts of a lock's text by which its holder is known again.
+std::string on_this_host() {
+  return " on " + host_name() + ",";
+}
+std::string of_this_job() {
+  const std::string job = batch_job();
+  return job.empty() ? "" : " job " + job + ",";
 }
 
-/// Who holds a lock: the lines of its file.
-struct Holder {
-  std::string host;
-  std::string job;    ///< "slurm 123_4"; empty without a batch system
-  std::string words;  ///< who it is, for people
+/// The text of a lock, which tells people who holds it.
+std::string this_process() {
+  return "process " + std::to_string(getpid()) + on_this_host() + of_this_job() + " since " +
+         time_text();
+}
 
-  static Holder this_process() {
-    Holder holder{host_name(), batch_job(), {}};
-    holder.words = "process " + std::to_string(getpid()) + " on " + holder.host +
-                   (holder.job.empty() ? "" : ", job " + holder.job) + ", since " + time_text() +
-                   " (" + own_command() + ")";
-    return holder;
-  }
-  [[nodiscard]] std::string text() const { return host + "\n" + job + "\n" + words + "\n"; }
-};
-
-/// As a message may show it: another user may have written the file.
-std::string printable(std::string text) {
+/// The text of a lock, as a message may show it, since another user may have written the file.
+/// Empty when nobody has written into it yet.
+std::string holder_of(const fs::path& path) {
   constexpr std::size_t kLongest = 1000;
-  text.resize(std::min(text.size(), kLongest));
+  std::string text(kLongest, '\0');
+  std::ifstream file(path, std::ios::binary);
+  file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(file.gcount()));
+  if (text.ends_with('\n')) text.pop_back();
   for (char& character : text)
     if (static_cast<unsigned char>(character) < 0x20 || character == 0x7f) character = '?';
   return text;
 }
 
-/// Of an open lock; without words when nobody has written into it yet. FileError when the file,
-/// which nobody holds, is anything else than a lock.
-Holder holder_of(int descriptor, const fs::path& path, bool is_held) {
-  constexpr std::size_t kMostBytes = 4096;
-  std::string text(kMostBytes, '\0');
-  const ssize_t bytes = pread(descriptor, text.data(), text.size(), 0);
-  text.resize(bytes > 0 ? static_cast<std::size_t>(bytes) : 0);
-  if (text.empty()) return {};
-  std::istringstream lines(text);
-  Holder holder;
-  std::getline(lines, holder.host);
-  std::getline(lines, holder.job);
-  std::getline(lines, holder.words);
-  if (!is_held && !holder.words.starts_with("process "))
-    throw FileError(path.string(),
-                    "is not the lock of an output: rename it, or choose another output");
-  holder.words = printable(holder.words);
-  return holder;
+/// Whether a lock that nobody holds was left by a process that has surely ended.
+bool is_of_ended_process(const std::string& holder) {
+  if (holder.empty()) return true;
+  const std::string job = of_this_job();
+  return holder.starts_with("process ") &&
+         (holder.find(on_this_host()) != std::string::npos ||
+          (!job.empty() && holder.find(job) != std::string::npos));
 }
 
 enum class Locked { Yes, ByAnother, NotSupported };
@@ -151,30 +122,26 @@ void require_lock_is_a_file(const fs::path& path) {
                     "choose another output");
 }
 
-/// Who has a lock that may only be read: another user's, for example.
-std::string readable_holder(const fs::path& path) {
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
-  if (descriptor < 0) return {};
-  const Holder holder = holder_of(descriptor, path, true);
-  ::close(descriptor);
-  return holder.words.empty() ? "" : "; it is the lock of " + holder.words;
-}
-
 [[noreturn]] void refuse(const fs::path& output,
                          const fs::path& lock,
-                         const Holder& holder,
+                         const std::string& holder,
                          bool is_held) {
-  const std::string who =
-      holder.words.empty() ? "a job that has not identified itself yet" : holder.words;
-  throw InputError(
-      "output",
-      output.string(),
-      is_held
-          ? "another job is writing it: " + who +
-                "; wait until it ends, stop it, or choose another output"
-          : "another job started writing it and did not end properly: " + who +
-                "; whether it is still running cannot be told from here: if it is not, remove " +
-                lock.string() + ", or give --no-lock, and run the same command again");
+  if (is_held)
+    throw InputError("output",
+                     output.string(),
+                     "another job is writing it: " +
+                         (holder.empty() ? "a job that has not identified itself yet" : holder) +
+                         " (" + lock.string() +
+                         "); wait until it ends, stop it, or choose another output");
+  if (!holder.starts_with("process "))
+    throw FileError(lock.string(),
+                    "is not the lock of an output: rename it, or choose another output");
+  throw InputError("output",
+                   output.string(),
+                   "another job started writing it and did not end properly: " + holder +
+                       "; whether it is still running cannot be told from here: if it is not, "
+                       "remove " +
+                       lock.string() + ", or give --no-lock, and run the same command again");
 }
 
 /// The outputs that this process has locked.
@@ -237,13 +204,11 @@ bool OutputLock::try_to_take(const fs::path& output) {
   const bool is_new = open_file();
   const Locked locked = lock_by_kernel(descriptor_, path_);
   if (!is_current(descriptor_, path_)) return false;
-  const Holder holder = holder_of(descriptor_, path_, locked == Locked::ByAnother);
-  const Holder mine = Holder::this_process();
-  const bool is_ours = holder.words.empty() || holder.host == mine.host ||
-                       (!mine.job.empty() && holder.job == mine.job);
-  const bool is_free = is_new ? locked != Locked::ByAnother : locked == Locked::Yes && is_ours;
+  const std::string holder = holder_of(path_);
+  const bool is_free =
+      is_new ? locked != Locked::ByAnother : locked == Locked::Yes && is_of_ended_process(holder);
   if (!is_free) refuse(output, path_, holder, locked == Locked::ByAnother);
-  write_text(descriptor_, mine.text(), path_);
+  write_text(descriptor_, this_process() + "\n", path_);
   return true;
 }
 
@@ -261,8 +226,10 @@ bool OutputLock::open_file() {
       if (errno == ENOENT) continue;  // removed in between: once more
     }
     const std::string reason = std::generic_category().message(errno);
+    const std::string holder = holder_of(path_);
     throw FileError(path_.string(),
-                    "cannot be opened for writing: " + reason + readable_holder(path_));
+                    "cannot be opened for writing: " + reason +
+                        (holder.empty() ? "" : "; it is the lock of " + holder));
   }
 }
 

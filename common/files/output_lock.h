@@ -7,10 +7,11 @@ namespace af {
 
 /// Keeps other jobs from writing the same output: "OUTPUT.lock" beside it, locked by the kernel
 /// (fcntl, of the open file), which lets go when this process ends, however it ends. The file says
-/// who holds it, and is removed in the end. A lock that a killed job left is taken over by a job of
-/// the same host, or of the same batch job, which was queued again; on another host nobody can tell
-/// whether its holder still runs. An output within a folder that this process has locked, or within
-/// FOLDER.partial or FOLDER.progress, needs no lock of its own. \test OutputLock.*
+/// who holds it, and is removed in the end. A lock that a killed job left is taken over on the same
+/// host, or by the same batch job when it is queued again; any other host's is refused, because
+/// nobody can tell whether its holder still runs. An output within a folder that this process has
+/// locked, or within FOLDER.partial or FOLDER.progress, needs no lock of its own. \test
+/// OutputLock.*
 class OutputLock {
  public:
   /// InputError that says who holds it, since when and what to do; FileError when the file cannot

@@ -130,7 +130,7 @@ TEST_F(OutputLocks, EveryProgramRefusesWhatAnotherJobWrites) {
 }
 
 TEST_F(OutputLocks, OfAnotherHostAreHeededUnlessToldOtherwise) {
-  write_text_file(folder_ / "drr.mha.lock", "elsewhere\n\nprocess 12 on elsewhere, since 2026\n");
+  write_text_file(folder_ / "drr.mha.lock", "process 12 on elsewhere, since 2026\n");
   const test::ProgramRun refused = test::run_command(line(drr(3, "drr.mha")));
   EXPECT_EQ(refused.exit_code, 3) << refused.output;
   EXPECT_THAT(refused.output, HasSubstr("process 12 on elsewhere"));

@@ -81,7 +81,7 @@ void be_killed_with_lock(const std::filesystem::path& output) {
 
 /// The lock that a job of another host left, as its file says.
 std::string left_lock(const std::string& host, const std::string& job = "") {
-  return host + "\n" + job + "\nprocess 12 on " + host + ", since 2026-01-01\n";
+  return "process 12 on " + host + ", " + job + "since 2026-01-01\n";
 }
 
 TEST(OutputLock, IsHeldByOneAndNamesIt) {
@@ -90,6 +90,8 @@ TEST(OutputLock, IsHeldByOneAndNamesIt) {
     const OutputLock lock(folder / "a.h5");
     const std::string said = refusal(folder / "a.h5");
     EXPECT_THAT(said, HasSubstr("another job is writing it: process " + std::to_string(getpid())));
+    EXPECT_THAT(said, HasSubstr(" on " + host_name() + ", "));
+    EXPECT_THAT(said, HasSubstr((folder / "a.h5.lock").string()));
     EXPECT_THAT(said, HasSubstr("since 20"));
     EXPECT_EQ(refusal(folder / "b.h5"), "");
   }
@@ -135,23 +137,26 @@ TEST(OutputLock, ThatAnotherHostLeftIsRefusedUnlessLocksAreOff) {
 TEST(OutputLock, ThatTheSameBatchJobLeftOnAnotherHostIsTakenOver) {
   const test::ScratchFolder folder;
   setenv("PBS_JOBID", "7", 1);
-  std::ofstream(folder / "a.h5.lock") << left_lock("elsewhere", "pbs 7");
+  std::ofstream(folder / "a.h5.lock") << left_lock("elsewhere", "job 7, ");
   EXPECT_EQ(refusal(folder / "a.h5"), "");
-  std::ofstream(folder / "a.h5.lock") << left_lock("elsewhere", "pbs 8");
+  std::ofstream(folder / "a.h5.lock") << left_lock("elsewhere", "job 77, ");
   EXPECT_NE(refusal(folder / "a.h5"), "");
   unsetenv("PBS_JOBID");
 }
 
 TEST(OutputLock, IsNoFileOfAnotherKindThatHasItsName) {
   const test::ScratchFolder folder;
-  std::ofstream(folder / "packages.lock") << "[[package]]\nname = \"a\"\nversion = \"1\"\n";
-  EXPECT_THAT(failure(folder / "packages"), HasSubstr("is not the lock of an output"));
-  EXPECT_THAT(read_text_file(folder / "packages.lock"), HasSubstr("version"));
+  const std::string of_this_host = "\nresolved on " + host_name() + ", since 2026-01-01\n";
+  for (const std::string& text : {"[[package]]" + of_this_host, of_this_host}) {
+    std::ofstream(folder / "packages.lock") << text;
+    EXPECT_THAT(failure(folder / "packages"), HasSubstr("is not the lock of an output"));
+    EXPECT_EQ(read_text_file(folder / "packages.lock"), text);
+  }
 }
 
 TEST(OutputLock, TextOfAHolderIsMadeHarmless) {
   const test::ScratchFolder folder;
-  std::ofstream(folder / "a.h5.lock") << "elsewhere\n\nprocess \x1b[2J" + std::string(3000, 'x');
+  std::ofstream(folder / "a.h5.lock") << "process \x1b[2J" + std::string(3000, 'x');
   EXPECT_THAT(refusal(folder / "a.h5"), AllOf(HasSubstr("process ?[2Jx"), SizeIs(Lt(2000U))));
 }
 
