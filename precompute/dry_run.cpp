@@ -55,9 +55,7 @@ void forecast_memory(const DryRun& run, const TileCounts& tiles, FieldForecast& 
   // The same rule as in choose_overflow(): ranks share the disk, but not the casting.
   const double cast_bytes_per_second =
       2.0 * run.speed.rays_per_second * run.speed.occupied_fraction * run.ranks;
-  if (run.options.has_checkpoint && run.options.overflow != "cast-again" &&
-      (run.options.overflow == "read-back" ||
-       run.disk.read_bytes_per_second >= cast_bytes_per_second))
+  if (run.options.has_checkpoint && run.disk.read_bytes_per_second >= cast_bytes_per_second)
     need.overflow = TileOverflow::ReadBack;
 }
 
@@ -69,7 +67,7 @@ void forecast_seconds(const DryRun& run, const TileCounts& tiles, FieldForecast&
   const double checkpoint_seconds =
       run.options.has_checkpoint ? seconds_at(tile_bytes, run.disk.write_bytes_per_second) : 0.0;
   // Most trainings end after about so many iterations.
-  const double iterations = std::min(10, run.options.max_iterations);
+  constexpr double kIterations = 10.0;
   const double overflow_fraction =
       tile_bytes > 0.0 ? 1.0 - static_cast<double>(need.kept_bytes) / tile_bytes : 0.0;
   const double overflow_seconds =
@@ -84,9 +82,10 @@ void forecast_seconds(const DryRun& run, const TileCounts& tiles, FieldForecast&
       std::min(static_cast<double>(run.ranks), static_cast<double>(run.lattice.slabs.size()));
   need.seconds = run.past;
   need.seconds.emplace_back("cast", cast_seconds + checkpoint_seconds);
-  need.seconds.emplace_back("train",
-                            iterations * (speed.codebook_seconds + speed.train_seconds_per_tile *
-                                                                       tiles.training / run.ranks));
+  need.seconds.emplace_back(
+      "train",
+      kIterations *
+          (speed.codebook_seconds + speed.train_seconds_per_tile * tiles.training / run.ranks));
   need.seconds.emplace_back(
       "encode", speed.encode_seconds_per_tile * tiles.occupied / run.ranks + overflow_seconds);
   need.seconds.emplace_back(

@@ -311,10 +311,7 @@ class PrecomputeRun {
       inform(world_, "tiles: all " + tile_bytes_text(cast) + " kept in memory");
       return {};
     }
-    OverflowChoice choice = choose_overflow(build, cast);
-    if (options_.overflow == "cast-again") choice.overflow = TileOverflow::CastAgain;
-    if (options_.overflow == "read-back" && build.progress != nullptr)
-      choice.overflow = TileOverflow::ReadBack;
+    const OverflowChoice choice = choose_overflow(build, cast);
     std::ostringstream text;
     text.precision(3);
     text << "tiles: " << cast.units_kept << " of " << units << " units (" << tile_bytes_text(cast)

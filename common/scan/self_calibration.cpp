@@ -17,6 +17,9 @@ namespace af {
 
 namespace {
 
+/// Smoothing of compared images, pixels of the working resolution.
+constexpr double kFinePx = 1.0;
+
 /// The scan with the detector where the calibration has it: what is a pixel at the axis, and with
 /// it every sampling, follows the object's size, so that costs of different distances compare.
 CircularScan with_distance_of(const CircularScan& scan, const ScanCalibration& calibration) {
@@ -233,7 +236,7 @@ AngleBasis SelfCalibrationOptions::basis_for(const CircularScan& scan,
   constexpr std::size_t kViewsPerHarmonic = 8;
   AngleBasis basis;
   basis.harmonics = std::min(harmonics, static_cast<int>(used_views / kViewsPerHarmonic));
-  if (!omits_drift) basis.drift = sweep_of(scan);
+  basis.drift = sweep_of(scan);
   return basis;
 }
 
@@ -243,15 +246,8 @@ void SelfCalibrationOptions::describe(Fields& field) {
         "Harmonics of the view angle in which the beam's foot and the detector's rotation may "
         "change; at most one per 16 views")
       .within(0, 12);
-  field("no_drift",
-        omits_drift,
-        "The foot and the rotation do not drift from the first view to the last. They may "
-        "otherwise, where the views follow each other");
   field("rounds", rounds, "Rounds of reconstructing, predicting and moving cameras").within(1, 100);
-  field("fine_px", fine_px, "Smoothing of compared images, pixels of the working resolution")
-      .within(0.3, 10.0);
-  field("coarse_px", coarse_px, "Image variation on scales above this is left out, pixels")
-      .within(2.0, 100.0);
+  field.leave_out(coarse_px, "one value suits every scan");
   field("working_px",
         working_px,
         "Images are binned until their larger side has at most so many pixels")
@@ -376,7 +372,7 @@ HeldOutResidual held_out_residual(const ScanImages& images,
   const std::vector<unsigned char> is_counted =
       fully_seen_pixels(scan, calibration, images.is_lit, object_radius_mm(reconstruction));
   const BandPass band_pass(
-      scan.size_px.x(), scan.size_px.y(), is_counted, options.fine_px, options.coarse_px);
+      scan.size_px.x(), scan.size_px.y(), is_counted, kFinePx, options.coarse_px);
   HeldOutResidual residual;
   residual.views.resize(judged.size());
   pool.for_each(static_cast<int>(judged.size()), [&](int task, int /*slot*/) {

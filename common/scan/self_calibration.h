@@ -15,13 +15,11 @@
 namespace af {
 
 struct SelfCalibrationOptions {
-  int harmonics = 8;         ///< of the view angle, in column, row and rotation
-  bool omits_drift = false;  ///< from the first view to the last
-  int rounds = 6;            ///< at the finer of two resolutions
-  double fine_px = 1.0;      ///< of the band pass, pixels of the working resolution
-  double coarse_px = 6.0;
-  int working_px = 200;  ///< the larger side of the images that rounds work on, at most
-  int search_px = 120;   ///< likewise for the search of what projections hardly tell
+  int harmonics = 8;       ///< of the view angle, in column, row and rotation
+  int rounds = 6;          ///< at the finer of two resolutions
+  double coarse_px = 6.0;  ///< of the band pass, pixels of the working resolution
+  int working_px = 200;    ///< the larger side of the images that rounds work on, at most
+  int search_px = 120;     ///< likewise for the search of what projections hardly tell
   /// Source to detector is sought within this share of the stated one; none: the scan's tolerance.
   std::optional<double> focal_share;
   double tilt_deg = 1.0;  ///< and the tilt within this

@@ -173,22 +173,22 @@ RegistrationTarget target_box_at(const Eigen::Vector3d& center_ct_mm, double sid
   return {center_ct_mm, {center_ct_mm - half, center_ct_mm + half}};
 }
 
-RegistrationTarget find_target(const CtVolume& ct, double side_mm) {
+RegistrationTarget find_target(const CtVolume& ct) {
   const Eigen::Vector3d centroid_mm = attenuation_centroid(ct);
   const CtBox bounds = bounding_box(ct.grid);
   const BoneTable bone(ct, bounds);
   Eigen::Vector3d center = centroid_mm;
   if (bone.total() > 0.0)
     center = bone_centroid_within(
-        ct, target_box_at(best_box_center(bone, centroid_mm, side_mm), side_mm).box_ct);
+        ct, target_box_at(best_box_center(bone, centroid_mm, kTargetSideMm), kTargetSideMm).box_ct);
   // Keep the box and its margin within the CT where the CT is large enough for them.
-  const double reach_mm = 0.5 * side_mm + kMarginCells * kCellMm;
+  const double reach_mm = 0.5 * kTargetSideMm + kMarginCells * kCellMm;
   for (int axis = 0; axis < 3; ++axis) {
     const double low = bounds.low_mm[axis] + reach_mm;
     const double high = bounds.high_mm[axis] - reach_mm;
     center[axis] = low <= high ? std::clamp(center[axis], low, high) : 0.5 * (low + high);
   }
-  return target_box_at(center, side_mm);
+  return target_box_at(center, kTargetSideMm);
 }
 
 RegionOfInterest target_region(const CameraGeometry& camera,

@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/hash_random.h"
+#include "base/number_text.h"
 #include "simulation/parallel_rows.h"
 
 namespace af {
@@ -23,20 +24,6 @@ std::int16_t rounded_hu(double hu, int step_hu) {
 
 }  // namespace
 
-void CtDegradationOptions::describe(Fields& field) {
-  field("ct_slice_mm",
-        slice_mm,
-        "degraded-ct: slices are averaged in groups of about this thickness, mm")
-      .within(0.1, 50.0);
-  field("ct_noise_hu", noise_hu, "degraded-ct: noise, HU").within(0.0, 1000.0);
-  field("ct_step_hu", step_hu, "degraded-ct: steps of the values, HU").within(1, 1000);
-  field.leave_out(threads, "voxels do not depend on it");
-}
-
-std::vector<std::string> problems(const CtDegradationOptions& options) {
-  return field_problems(options);
-}
-
 int slices_per_group(const CtGrid& grid, double slice_mm) {
   return std::max(1, static_cast<int>(std::lround(slice_mm / grid.spacing_mm.z())));
 }
@@ -50,8 +37,9 @@ CtVolume degraded_ct(const CtVolume& ct,
   CtGrid grid = ct.grid;
   grid.size[2] = ct.grid.size[2] / group;
   if (grid.size[2] < 2)
-    throw InputError(
-        "slice_mm", std::to_string(options.slice_mm), "must leave at least two slices of this CT");
+    throw InputError("degraded-ct",
+                     number_text(options.slice_mm) + " mm",
+                     "must leave at least two slices of this CT");
   grid.spacing_mm.z() *= group;
   grid.origin_mm = ct.grid.point_mm(Eigen::Vector3d(0.0, 0.0, 0.5 * (group - 1)));
   const std::size_t slice_voxels =

@@ -2,10 +2,7 @@
 #pragma once
 
 #include <cstdint>
-#include <string>
-#include <vector>
 
-#include "base/described_fields.h"
 #include "volume/ct_volume.h"
 
 namespace af {
@@ -16,11 +13,7 @@ struct CtDegradationOptions {
   double noise_hu = 30.0;  ///< standard deviation, independent from voxel to voxel
   int step_hu = 20;        ///< values are rounded to multiples of this
   int threads = 0;         ///< 0: as many as the hardware has; voxels do not depend on it
-
-  void describe(Fields& field);
 };
-
-std::vector<std::string> problems(const CtDegradationOptions& options);
 
 /// Slices (k) per averaged group: slice_mm over the slice spacing, rounded, at least 1.
 int slices_per_group(const CtGrid& grid, double slice_mm);

@@ -59,13 +59,9 @@ void DetectorOptions::describe(Fields& field) {
         scatter_to_primary_ratio,
         "Mean scatter / mean primary within the region of interest")
       .within(0.0, 100.0);
-  field("scatter_sigma_mm", scatter_sigma_mm, "Width of the scatter kernel, mm")
-      .within(1.0, 1000.0);
+  field.leave_out(scatter_sigma_mm, "the same for every detector");
   field.leave_out(scatter_source, "a stress");
-  field("heel_ramp", heel_ramp, "The beam grows by (1+h)/(1-h) from first to last row")
-      .within(0.0, 0.9)
-      .no_option("a stress")
-      .not_recorded("a stress");
+  field.leave_out(heel_ramp, "a stress");
   field("photons_per_pixel",
         photons_per_pixel,
         "Photons per pixel in the open beam, for Poisson noise")

@@ -88,18 +88,6 @@ double SteelBodies::chord_length_mm(const Eigen::Vector3d& source_point,
   return sum_mm;
 }
 
-void OccluderOptions::describe(Fields& field) {
-  field("rod_count", rod_count, "rods: how many").within(0, 100);
-  field("rod_diameter_mm", rod_diameter_mm, "rods: diameter, mm").within(0.1, 50.0);
-  field("rod_length_mm", rod_length_mm, "rods: length, mm").within(1.0, 1000.0);
-  field("ball_count", ball_count, "fiducials: how many balls").within(0, 1000);
-  field("ball_diameter_mm", ball_diameter_mm, "fiducials: diameter, mm").within(0.1, 50.0);
-}
-
-std::vector<std::string> problems(const OccluderOptions& options) {
-  return field_problems(options);
-}
-
 OccluderSite occluder_site(const std::vector<View>& views,
                            const RigidTransform& room_from_ct,
                            const Eigen::Vector3d& center_ct_mm) {

@@ -2,10 +2,8 @@
 #pragma once
 
 #include <cstdint>
-#include <string>
 #include <vector>
 
-#include "base/described_fields.h"
 #include "drr/drr_renderer.h"
 #include "simulation/fiducials.h"
 
@@ -38,11 +36,7 @@ struct OccluderOptions {
   double rod_length_mm = 150.0;
   int ball_count = 8;
   double ball_diameter_mm = 3.0;
-
-  void describe(Fields& field);
 };
-
-std::vector<std::string> problems(const OccluderOptions& options);
 
 /// Where bodies are placed so that every view's region of interest shows them.
 struct OccluderSite {

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "base/hash_random.h"
-#include "base/number_text.h"
 #include "simulation/parallel_rows.h"
 
 namespace af {
@@ -15,8 +14,6 @@ namespace af {
 namespace {
 
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
-/// Steepest slope of t^3 (10 - 15 t + 6 t^2).
-constexpr double kRampSlope = 1.875;
 
 /// Trilinear HU at continuous voxel indices, edges replicated.
 double hu_at(const CtVolume& ct, const Eigen::Vector3d& index) {
@@ -47,28 +44,6 @@ double hu_at(const CtVolume& ct, const Eigen::Vector3d& index) {
 }
 
 }  // namespace
-
-void SmoothMotionOptions::describe(Fields& field) {
-  field("motion_mm", amplitude_mm, "motion: largest displacement along an axis, mm");
-  field("motion_wavelength_mm", wavelength_mm, "motion: wavelength, mm").within(1.0, 10000.0);
-  field("motion_margin_mm", margin_mm, "motion: what stays still around the target box, mm")
-      .within(0.0, 1000.0);
-  field("motion_ramp_mm", ramp_mm, "motion: from still to full displacement, mm")
-      .within(1.0, 1000.0);
-  field.leave_out(threads, "voxels do not depend on it");
-}
-
-std::vector<std::string> problems(const SmoothMotionOptions& options) {
-  std::vector<std::string> found = field_problems(options);
-  if (!found.empty()) return found;
-  // Three components, each with these slopes at worst in one direction.
-  const double slope_per_mm =
-      std::sqrt(3.0) * (kTwoPi / options.wavelength_mm + kRampSlope / options.ramp_mm);
-  if (!(options.amplitude_mm >= 0.0 && options.amplitude_mm <= 1.0 / slope_per_mm))
-    found.push_back("motion_mm = " + number_text(options.amplitude_mm) +
-                    ": must be between 0 and " + number_text(1.0 / slope_per_mm));
-  return found;
-}
 
 SmoothMotion::SmoothMotion(const CtBox& still_box_ct,
                            const SmoothMotionOptions& options,

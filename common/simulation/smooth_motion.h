@@ -3,28 +3,20 @@
 
 #include <array>
 #include <cstdint>
-#include <string>
-#include <vector>
 
-#include "base/described_fields.h"
 #include "geometry/slab_sizing.h"
 #include "volume/ct_volume.h"
 
 namespace af {
 
+/// These do not fold space: the slopes of wave and ramp add up to less than 1.
 struct SmoothMotionOptions {
   double amplitude_mm = 6.0;     ///< largest displacement along each axis
   double wavelength_mm = 160.0;  ///< of the displacement
   double margin_mm = 5.0;        ///< around the target box that stays still, too
   double ramp_mm = 40.0;         ///< from still to full displacement
   int threads = 0;               ///< 0: as many as the hardware has; voxels do not depend on it
-
-  void describe(Fields& field);
 };
-
-/// The amplitude is limited so that the displacement cannot fold space: the slopes of wave and
-/// ramp add up to less than 1.
-std::vector<std::string> problems(const SmoothMotionOptions& options);
 
 /// A smooth displacement of the ct frame that is zero in and near a box: breathing, say, around a
 /// vertebra that keeps its place. Along each axis a plane wave of drawn direction and phase, times

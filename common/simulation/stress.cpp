@@ -5,9 +5,17 @@
 #include <array>
 #include <sstream>
 
+#include "simulation/ct_degradation.h"
+#include "simulation/occluders.h"
+#include "simulation/smooth_motion.h"
+
 namespace af {
 
 namespace {
+
+constexpr double kHeelRamp = 0.25;         // share of the beam lost or gained at the edges
+constexpr double kScatterToPrimary = 2.0;  // of scatter that the open beam adds to
+constexpr double kPhotonsPerPixel = 2e4;   // in the open beam
 
 struct NamedStress {
   Stress effect;
@@ -39,48 +47,50 @@ std::string sentence(const Parts&... parts) {
 }
 
 std::string description(Stress effect, const StressOptions& o) {
+  const OccluderOptions occluders;
+  const CtDegradationOptions degraded;
+  const SmoothMotionOptions motion;
   switch (effect) {
     case Stress::Rods:
-      return sentence(o.occluders.rod_count,
+      return sentence(occluders.rod_count,
                       " steel rods of ",
-                      o.occluders.rod_diameter_mm,
+                      occluders.rod_diameter_mm,
                       " mm across the region of interest, in the X-rays but not in the CT");
     case Stress::Fiducials:
-      return sentence(o.occluders.ball_count,
+      return sentence(occluders.ball_count,
                       " steel balls of ",
-                      o.occluders.ball_diameter_mm,
+                      occluders.ball_diameter_mm,
                       " mm in the region of interest, in the X-rays but not in the CT");
     case Stress::Heel:
       return sentence("the beam varies by +-",
-                      100.0 * o.heel_ramp,
+                      100.0 * kHeelRamp,
                       " % from the first to the last row of the detector");
     case Stress::Scatter:
       return sentence("scatter that the open beam adds to, ",
-                      o.scatter_to_primary_ratio,
+                      kScatterToPrimary,
                       " times the primary within the region of interest");
     case Stress::Noise:
-      return sentence(
-          "Poisson noise of ", o.photons_per_pixel, " photons per pixel in the open beam");
+      return sentence("Poisson noise of ", kPhotonsPerPixel, " photons per pixel in the open beam");
     case Stress::DegradedCt:
       return sentence("the study's CT has slices of about ",
-                      o.degraded_ct.slice_mm,
+                      degraded.slice_mm,
                       " mm, noise of ",
-                      o.degraded_ct.noise_hu,
+                      degraded.noise_hu,
                       " HU and steps of ",
-                      o.degraded_ct.step_hu,
+                      degraded.step_hu,
                       " HU; the X-rays show the original CT",
                       o.has(Stress::Motion) ? ", moved" : "");
     case Stress::Calibration:
       return sentence("the rig of the study misses the one of the X-rays by ",
-                      o.calibration_error_px,
+                      kCalibrationErrorPx,
                       " px RMS over the target box");
     case Stress::Motion:
       return sentence("the X-rays show anatomy moved smoothly by up to ",
-                      o.motion.amplitude_mm,
+                      motion.amplitude_mm,
                       " mm along each axis, not at all within ",
-                      o.motion.margin_mm,
+                      motion.margin_mm,
                       " mm of the target box and fully beyond another ",
-                      o.motion.ramp_mm,
+                      motion.ramp_mm,
                       " mm");
   }
   return {};
@@ -102,10 +112,10 @@ bool StressOptions::has(Stress effect) const {
 }
 
 DetectorOptions StressOptions::detector(DetectorOptions detector) const {
-  if (has(Stress::Heel)) detector.heel_ramp = heel_ramp;
-  if (has(Stress::Noise)) detector.photons_per_pixel = photons_per_pixel;
+  if (has(Stress::Heel)) detector.heel_ramp = kHeelRamp;
+  if (has(Stress::Noise)) detector.photons_per_pixel = kPhotonsPerPixel;
   if (has(Stress::Scatter)) {
-    detector.scatter_to_primary_ratio = scatter_to_primary_ratio;
+    detector.scatter_to_primary_ratio = kScatterToPrimary;
     detector.scatter_source = ScatterSource::ObjectAndOpenBeam;
   }
   return detector;
@@ -121,28 +131,6 @@ void StressOptions::describe(Fields& field) {
       .comma_separated()
       .one_of(stress_names())
       .choice(stress_names());
-  field.part(occluders);
-  field("heel_ramp", heel_ramp, "heel: share by which the beam varies, 0.25 for +-25 %");
-  field("open_scatter_to_primary",
-        scatter_to_primary_ratio,
-        "scatter: mean scatter / mean primary within the region of interest");
-  field("noisy_photons_per_pixel", photons_per_pixel, "noise: photons per pixel in the open beam");
-  field.part(degraded_ct);
-  field("calibration_error_px",
-        calibration_error_px,
-        "calibration: RMS shift of the target box's projections, px")
-      .within(1e-6, 20.0);
-  field.part(motion);
-}
-
-std::vector<std::string> problems(const StressOptions& options) {
-  std::vector<std::string> found = field_problems(options);
-  if (found.empty()) found = problems(options.motion);
-  // Strengths of detector effects keep the detector's limits, wanted or not.
-  StressOptions all = options;
-  all.names = {"all"};
-  for (const std::string& text : problems(all.detector({}))) found.push_back(text);
-  return found;
 }
 
 std::vector<StressDescription> descriptions(const StressOptions& options) {

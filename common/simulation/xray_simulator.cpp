@@ -22,8 +22,6 @@ void XraySimulationOptions::describe(Fields& field) {
   field.start_group("Imaging (0 switches an effect off)");
   field.part(spectrum);
   field.part(detector);
-  field("rays_per_pixel_side", rays_per_pixel_side, "n: a pixel is the mean of n x n rays")
-      .within(1, 16);
   field.start_group("");
   field("threads", threads, "Threads (0: all of the machine); results do not depend on them")
       .within(0, 1024);
@@ -65,23 +63,14 @@ Image2d XraySimulator::primary_image(const CameraGeometry& camera,
                                      const ProgressCallback& progress) const {
   const RigidTransform ct_from_room = room_from_ct.inverse();
   const Eigen::Vector3d source_ct_mm = ct_from_room * camera.source_point;
-  const int side = options_.rays_per_pixel_side;
   Image2d primary(camera.size_px.x(), camera.size_px.y());
-  const auto pixel_mean = [&](int column, int row) {
-    double sum = 0.0;
-    for (int j = 0; j < side; ++j)
-      for (int i = 0; i < side; ++i)
-        sum += transmission(source_ct_mm,
-                            ct_from_room * camera.detector_point(column - 0.5 + (i + 0.5) / side,
-                                                                 row - 0.5 + (j + 0.5) / side));
-    return sum / (side * side);
-  };
   for_each_row(
       primary.height,
       options_.threads,
       [&](int row) {
         for (int column = 0; column < primary.width; ++column)
-          primary.at(column, row) = static_cast<float>(pixel_mean(column, row));
+          primary.at(column, row) = static_cast<float>(
+              transmission(source_ct_mm, ct_from_room * camera.detector_point(column, row)));
       },
       progress);
   return primary;

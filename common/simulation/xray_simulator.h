@@ -23,10 +23,9 @@ namespace af {
 struct XraySimulationOptions {
   SpectrumOptions spectrum;
   DetectorOptions detector;
-  int rays_per_pixel_side = 1;  ///< n: a pixel is the mean of n x n rays
-  int threads = 0;              ///< 0: as many as the hardware has; results do not depend on it
+  int threads = 0;  ///< 0: as many as the hardware has; results do not depend on it
 
-  /// One energy, one ray per pixel, no scatter, noise, blur or quantisation: Beer and Lambert's
+  /// One energy, no scatter, noise, blur or quantisation: Beer and Lambert's
   /// law.
   static XraySimulationOptions ideal();
 

@@ -7,6 +7,10 @@
 
 namespace af {
 
+namespace {
+constexpr int kEnergyBins = 40;
+}  // namespace
+
 SpectrumOptions SpectrumOptions::one_energy() {
   SpectrumOptions options;
   options.tube_kvp = 0.0;
@@ -19,7 +23,6 @@ void SpectrumOptions::describe(Fields& field) {
         return kvp == 0.0 || (kvp >= 30.0 && kvp <= kHighestTableEnergyKev);
       });
   field("aluminium_mm", aluminium_mm, "Filtration, mm of aluminium").within(0.0, 50.0);
-  field("energy_bins", energy_bins, "Energy bins of the spectrum, at least 20").within(20, 1000);
 }
 
 std::vector<std::string> problems(const SpectrumOptions& options) {
@@ -30,9 +33,9 @@ std::vector<SpectrumBin> tube_spectrum(const SpectrumOptions& options,
                                        double effective_energy_kev) {
   if (options.is_one_energy()) return {{effective_energy_kev, 1.0}};
   std::vector<SpectrumBin> bins;
-  const double width_kev = (options.tube_kvp - kLowestTableEnergyKev) / options.energy_bins;
+  const double width_kev = (options.tube_kvp - kLowestTableEnergyKev) / kEnergyBins;
   double sum = 0.0;
-  for (int i = 0; i < options.energy_bins; ++i) {
+  for (int i = 0; i < kEnergyBins; ++i) {
     const double energy_kev = kLowestTableEnergyKev + (i + 0.5) * width_kev;
     const double photons = (options.tube_kvp - energy_kev) / energy_kev;
     const double filtered =

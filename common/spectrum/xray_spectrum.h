@@ -13,7 +13,6 @@ namespace af {
 struct SpectrumOptions {
   double tube_kvp = 100.0;    ///< 0: one energy, the effective energy of the CT's HU scale
   double aluminium_mm = 3.0;  ///< total filtration
-  int energy_bins = 40;       ///< of equal width between 10 keV and the tube voltage
 
   /// The effective energy alone: Beer and Lambert's law.
   static SpectrumOptions one_energy();
@@ -24,7 +23,7 @@ struct SpectrumOptions {
 
 std::vector<std::string> problems(const SpectrumOptions& options);
 
-/// One energy bin.
+/// One energy bin, of those of equal width between 10 keV and the tube voltage.
 struct SpectrumBin {
   double energy_kev;  ///< centre
   double weight;      ///< share of the open beam's detector signal

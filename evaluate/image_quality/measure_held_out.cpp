@@ -25,6 +25,9 @@
 namespace af::evaluation {
 namespace {
 
+/// Standard deviation of the Gaussian by which images are smoothed for the second PSNR.
+constexpr double kSmoothingPx = 1.5;
+
 /// Ray casting, or a field.
 struct Predictor {
   std::string name;
@@ -113,7 +116,7 @@ void judge_view(const HeldOutOptions& options,
   };
   // Beyond the region no DRR is rendered: smoothing must not fetch the X-ray from there, either.
   const Image2d measured = judged_part(xray.attenuation);
-  const Image2d smooth_measured = gaussian_blur(measured, options.smoothing_px);
+  const Image2d smooth_measured = gaussian_blur(measured, kSmoothingPx);
   for (std::size_t i = 0; i < predictors.size(); ++i) {
     const Image2d predicted = judged_part(drrs[i]);
     found.rows.push_back(
@@ -121,18 +124,18 @@ void judge_view(const HeldOutOptions& options,
          study_view.camera,
          predictors[i].name,
          psnr_over(predicted, measured, pixels),
-         psnr_over(gaussian_blur(predicted, options.smoothing_px), smooth_measured, pixels)});
+         psnr_over(gaussian_blur(predicted, kSmoothingPx), smooth_measured, pixels)});
   }
 }
 
-CsvTable rows_table(const std::vector<HeldOutRow>& rows, double smoothing_px) {
-  return csv_table(rows, [&](const HeldOutRow& row) -> CsvCells {
+CsvTable rows_table(const std::vector<HeldOutRow>& rows) {
+  return csv_table(rows, [](const HeldOutRow& row) -> CsvCells {
     return {{"case", row.case_name},
             {"camera", row.camera},
             {"prediction", row.predictor},
             {"psnr_db", row.psnr_db},
             {"smoothed_psnr_db", row.smoothed_psnr_db},
-            {"smoothing_px", smoothing_px}};
+            {"smoothing_px", kSmoothingPx}};
   });
 }
 
@@ -183,11 +186,6 @@ void HeldOutOptions::describe(Fields& field_list) {
   field_list(
       "look_up", look_up, "How DRRs are looked up [each field's own way]. " + field_look_up_help())
       .choice(field_look_up_names());
-  field_list("smoothing_px",
-             smoothing_px,
-             "Gaussian by which X-rays and predictions are smoothed for the second PSNR, standard "
-             "deviation in pixels")
-      .within(0.0, 100.0);
   field_list("threads", threads, "Threads; 0: every processor").within(0, 1024);
   field_list("output",
              output,
@@ -234,7 +232,7 @@ void run_held_out(const HeldOutOptions& options,
     if (found.rows.empty())
       throw InputError(
           "study", options.study.string(), "no view has all rays of its region in the fields");
-    write_text_file(csv, rows_table(found.rows, options.smoothing_px).to_text());
+    write_text_file(csv, rows_table(found.rows).to_text());
     draw_results({csv.string()}, world);
     if (found.views_outside > 0)
       std::cout << found.views_outside

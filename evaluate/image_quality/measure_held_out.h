@@ -20,7 +20,6 @@ struct HeldOutOptions {
   CtReadOptions ct_reading;
   RayCasterOptions ray_caster;
   std::string look_up;  ///< empty: each field's own
-  double smoothing_px = 1.5;
   int threads = 0;
   std::filesystem::path output = "held-out.md";
 

@@ -274,8 +274,6 @@ void describe_base(Fields& field, PrecomputeOptions& base) {
   field.at("uv_nodes").as("--base-uv-nodes", "(u,v) nodes while others vary [64]");
   field.at("st_nodes").as("--base-st-nodes", "(s,t) nodes while others vary [256]");
   field.at("codewords").as("--base-codewords", "Codewords while others vary [16384]");
-  field.at("training_fraction")
-      .as("--base-training-fraction", "Share of the tiles for training while others vary");
 }
 
 }  // namespace

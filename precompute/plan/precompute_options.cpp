@@ -213,9 +213,8 @@ void describe_codebook(Fields& field, PrecomputeOptions& options) {
       .decides(kCodebookStage);
   field("mean_step",
         options.mean_step,
-        "Means of mean-removed tiles are multiples of so many levels of 65535 [64]")
-      .within(1, kMaxMeanStep)
-      .needs({"--tile-coding"})
+        "Means of mean-removed tiles are multiples of so many levels of 65535")
+      .no_option("the preset's, or 64")
       .decides(kCodebookStage);
   field("tile_filter",
         options.tile_filter,
@@ -226,16 +225,6 @@ void describe_codebook(Fields& field, PrecomputeOptions& options) {
         "--preset]")
       .one_of({"none", "neighbours"})
       .not_deciding("samples and indices are the same");
-  field("max_iterations",
-        options.max_iterations,
-        "Most iterations of the training, see --min-improvement")
-      .decides(kCodebookStage);
-  field("min_improvement",
-        options.min_improvement,
-        "The training ends when an iteration lowers the squared error of its tiles by less than "
-        "this share of it [0.005 for one slab, as in the paper's design, else 0.015]")
-      .within(0.0, 0.5)
-      .decides(kCodebookStage);
   field("training_fraction",
         options.training_fraction,
         "Share of the tiles that are not empty on which the codebook is trained; the paper's was "
@@ -263,16 +252,11 @@ void describe_run(Fields& field, PrecomputeOptions& options) {
   field("memory_limit_bytes",
         options.memory_limit_bytes,
         "Memory that each rank may take beside the CT and its grid, which every node holds once, "
-        "e.g. 8GB. Tiles that do not fit are read back or cast again, see --overflow [300 MiB]")
+        "e.g. 8GB. Tiles that do not fit are read back from FIELD.h5.progress, or cast again where "
+        "that is measured to be faster [300 MiB]")
       .as("--memory-limit")
       .size()
       .default_in_help()
-      .not_deciding(why);
-  field("overflow",
-        options.overflow,
-        "What to do, after the training, about tiles that did not fit into memory: read-back (from "
-        "FIELD.h5.progress), cast-again, or auto (whichever is measured to be faster)")
-      .one_of({"auto", "read-back", "cast-again"})
       .not_deciding(why);
   field("mpi_io_hints",
         options.mpi_io_hints,
@@ -380,7 +364,6 @@ PrecomputeOptions PrecomputeOptions::with_design(const FieldDesign& design) cons
     options.tile_filter = "neighbours";
   else if (options.design().filters_tiles)
     options.tile_filter = "none";
-  options.min_improvement = min_improvement.value_or(min_improvement_of(design));
   return options;
 }
 
@@ -388,8 +371,7 @@ CodebookOptions PrecomputeOptions::codebook_options() const {
   CodebookOptions options;
   options.codewords = design().codewords;
   options.mean_step = design().mean_step;
-  options.max_iterations = max_iterations;
-  options.min_relative_improvement = min_improvement.value_or(min_improvement_of(design()));
+  options.min_relative_improvement = min_improvement_of(design());
   options.seed = seed;
   return options;
 }
@@ -424,8 +406,6 @@ std::vector<std::string> problems(const PrecomputeOptions& options) {
   if (!options.needs_probe() && design.fits_uv && design.uv_nodes < kFewestFittedViewpoints)
     found.push_back("uv_nodes = " + std::to_string(design.uv_nodes) + ": must be at least " +
                     std::to_string(kFewestFittedViewpoints) + " with uv_samples = least-squares");
-  if (options.mean_step && options.tile_coding == "plain")
-    found.emplace_back("mean_step: plain tiles have no means; leave it out");
   if (!options.center_ct_mm.empty() && options.center_ct_mm.size() != 3)
     found.push_back("center_ct_mm has " + std::to_string(options.center_ct_mm.size()) +
                     " numbers: must be x,y,z");

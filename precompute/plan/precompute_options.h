@@ -70,14 +70,11 @@ struct PrecomputeOptions {
   std::string projections_common = "keep";  ///< or "remove"
 
   std::optional<int> codewords;
-  int max_iterations = CodebookOptions{}.max_iterations;
-  std::optional<double> min_improvement;    ///< none: min_improvement_of() the design
   std::optional<double> training_fraction;  ///< none: kTrainingTilesPerCodeword decide
   std::uint64_t max_training_tiles = TrainingSelection{}.max_training_tiles;
   std::uint64_t seed = 1;
 
   std::uint64_t memory_limit_bytes = 0;  ///< per rank beside the CT; 0: kDefaultMemoryLimitBytes
-  std::string overflow = "auto";         ///< of tiles beyond it: "auto", "read-back", "cast-again"
   std::string output;
   std::vector<std::string> mpi_io_hints;  ///< KEY=VALUE
   bool is_dry_run = false;
@@ -132,7 +129,7 @@ inline constexpr std::uint64_t kTrainingTilesPerCodeword = 64;
 inline constexpr std::uint64_t kFewerTrainingTilesPerCodeword = 32;
 /// Upper limit of that default, so that 65536 codewords take at most twice the time of 16384.
 inline constexpr std::uint64_t kTrainingTilesUnlessStated = std::uint64_t{1} << 20u;
-/// Default improvement below which training ends. The paper's single slab keeps the stricter limit,
+/// Improvement below which training ends. The paper's single slab keeps the stricter limit,
 /// so that its files stay byte-identical; with several slabs the last iterations gain less than
 /// interpolation loses (precompute/README.md).
 double min_improvement_of(const FieldDesign& design);

@@ -6,11 +6,10 @@ from .blocks import Items, Section, Terms, Text, heading, strong
 from .numbers import whole
 
 SIMULATION = {
-    "tube-kvp": ("Tube voltage", "kV"), "aluminium-mm": ("Filter", "mm aluminium"), "energy-bins": ("Spectrum", "energy bins"),
-    "scatter-to-primary": ("Scatter-to-primary ratio", ""), "scatter-sigma-mm": ("Scatter kernel, sigma", "mm"),
+    "tube-kvp": ("Tube voltage", "kV"), "aluminium-mm": ("Filter", "mm aluminium"),
+    "scatter-to-primary": ("Scatter-to-primary ratio", ""),
     "photons-per-pixel": ("Photons per pixel, open beam (Poisson noise)", ""), "blur-sigma-px": ("Detector blur, sigma", "pixels"),
-    "bits": ("Quantisation", "bits"), "rays-per-pixel-side": ("Rays per pixel side", ""),
-    "fiducial-sigma-px": ("Noise of the fiducials' detected positions", "pixels"),
+    "bits": ("Quantisation", "bits"),
     "max-offset-rotation-deg": ("True pose: drawn within, per angle", "degrees of nominal"),
     "max-offset-translation-mm": ("True pose: drawn within, per axis", "mm of nominal"), "seed": ("Seed", "")}
 

@@ -9,25 +9,6 @@
 namespace af::registration {
 namespace {
 
-void replace_in_chain(const MethodOptions& options, ChainOptions& chain) {
-  for (StageOptions& stage : chain.stages) {
-    if (options.bins.has_value()) stage.similarity.bins = *options.bins;
-    if (options.coarse_roi_scale.has_value() && stage.roi_scale > 1.0)
-      stage.roi_scale = *options.coarse_roi_scale;
-  }
-}
-
-void replace_in_stages(const MethodOptions& options, RegistrationOptions& result) {
-  if (options.similarity.has_value()) result.use_similarity(*options.similarity);
-  if (options.optimizer.has_value()) result.use_optimizer(*options.optimizer);
-  for (ChainOptions& chain : result.chains) {
-    if (options.smoothing_sigma_mm.has_value() && !chain.stages.empty())
-      chain.stages.front().smoothing_sigma_mm = *options.smoothing_sigma_mm;
-    replace_in_chain(options, chain);
-  }
-  replace_in_chain(options, result.finish);
-}
-
 /// The chain of a finish or a judge, which cannot depend on other chains.
 ChainOptions unconditional_chain(const std::string& name, const std::string& text) {
   ChainOptions chain = chain_from_text(name, text);
@@ -98,16 +79,9 @@ void describe_chains(Fields& field, MethodOptions& options) {
         "the views. 0: nearly always the first chain's end; 1: never (default: the preset's, 0.6 "
         "of robust; 1 where chains are typed over another preset)")
       .within(0.0, 1.0);
-  field("bins", options.bins, "Histogram bins per axis, 2 to 256 (default: 64)").not_recorded(why);
   field("smoothing_sigma_mm",
         options.smoothing_sigma_mm,
         "First stage: Gaussian on the X-rays, mm on the isocentre plane (paper: 1)")
-      .not_recorded(why);
-  field("coarse_roi_scale",
-        options.coarse_roi_scale,
-        "Coarse stages look at this many times the region's sides (fast, robust: 2), cut at the "
-        "detector's edges. Fields need not be made for it: they hold every ray of the whole "
-        "detector")
       .not_recorded(why);
 }
 
@@ -141,7 +115,11 @@ std::string MethodOptions::preset_name() const {
 RegistrationOptions resolve(const MethodOptions& options) {
   RegistrationOptions result = preset_options(options.preset_name());
   replace_chains(options, result);
-  replace_in_stages(options, result);
+  if (options.similarity.has_value()) result.use_similarity(*options.similarity);
+  if (options.optimizer.has_value()) result.use_optimizer(*options.optimizer);
+  for (ChainOptions& chain : result.chains)
+    if (options.smoothing_sigma_mm.has_value() && !chain.stages.empty())
+      chain.stages.front().smoothing_sigma_mm = *options.smoothing_sigma_mm;
   if (options.max_evaluations.has_value()) result.max_evaluations = *options.max_evaluations;
   result.seed = options.seed;
   std::vector<std::string> found = problems(result);

@@ -19,9 +19,7 @@ struct MethodOptions {
   std::optional<std::string> judge;   ///< one stage's text: replaces the portfolio's judge
   std::optional<std::string> similarity;     ///< of every stage
   std::optional<std::string> optimizer;      ///< of every stage
-  std::optional<int> bins;                   ///< of every stage
   std::optional<double> smoothing_sigma_mm;  ///< of each chain's first stage
-  std::optional<double> coarse_roi_scale;    ///< of stages that look beyond the region
   std::optional<int> max_evaluations;
   /// Radius, mm on the isocentre plane, of the discs about fiducials that registration does not
   /// see.

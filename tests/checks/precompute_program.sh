@@ -160,11 +160,12 @@ large=(--ct ct.mha --rig c-arm-12in --camera AP --max-translation-mm 5 --uv-node
 large+=(--max-training-tiles 50000)
 "$program" "${large[@]}" --memory-limit 4GB -o kept.h5 >kept.txt 2>kept.err
 grep -q 'all .* kept in memory' kept.err || fail "tiles were not kept: $(cat kept.err)"
-for overflow in read-back cast-again; do
-  "$program" "${large[@]}" --memory-limit "${memory_limit}MB" --overflow "$overflow" -o bound.h5 >bound.txt 2>bound.err ||
-    fail "--overflow $overflow: $(cat bound.err)"
-  grep -q "the others are ${overflow%%-*}" bound.err || fail "it did not $overflow: $(cat bound.err)"
-  [[ $(hash_of bound.txt) == "$(hash_of kept.txt)" ]] || fail "another payload with --overflow $overflow"
+for overflow in 'read back\|cast again' 'cast again'; do
+  [[ $overflow == read* ]] && without=() || without=(--no-checkpoint)
+  "$program" "${large[@]}" --memory-limit "${memory_limit}MB" "${without[@]}" -o bound.h5 >bound.txt 2>bound.err ||
+    fail "a limit on memory: $(cat bound.err)"
+  grep -q "the others are \($overflow\)" bound.err || fail "not $overflow: $(cat bound.err)"
+  [[ $(hash_of bound.txt) == "$(hash_of kept.txt)" ]] || fail 'another payload under a limit on memory'
   peak=$(sed -n 's/.*peak memory \([0-9]*\)[.0-9]* MB of one rank.*/\1/p' bound.err)
   [[ -n $peak && ($peak -lt $memory_limit || -n $sanitized) ]] || fail "a rank took ${peak:-?} MB of $memory_limit MB"
 done

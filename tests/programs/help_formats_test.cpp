@@ -84,8 +84,8 @@ TEST(SlicerModule, RegistersFromATransformOfSlicer) {
 }
 
 TEST(Option, IsFoundWithUnderscoresForDashes) {
-  const test::ProgramRun known = run_command(program("af-drr") + " --window_percent=90,10");
-  EXPECT_THAT(known.output, Not(HasSubstr("window_percent")));
+  const test::ProgramRun known = run_command(program("af-drr") + " --rotation_deg=0,0,0");
+  EXPECT_THAT(known.output, Not(HasSubstr("rotation_deg")));
   const test::ProgramRun unknown = run_command(program("af-drr") + " -o x.mha --no_such_option");
   EXPECT_EQ(unknown.exit_code, 2);
   EXPECT_THAT(unknown.output, HasSubstr("--no_such_option"));

@@ -85,7 +85,7 @@ class AfScan : public testing::Test {
                              (scratch_ / "scan.toml").string() + "' -o '" +
                              (scratch_ / "study").string() +
                              "' --harmonics 2 --rounds 3 --focal-share 0 --tilt-deg 0 --pairs 2 " +
-                             "--coarse-px 4 --working-px 72 --search-px 36 " + more);
+                             "--working-px 72 --search-px 36 " + more);
   }
   /// A refused scan leaves nothing behind.
   void expect_refused(int exit_code, const std::string& message) const {

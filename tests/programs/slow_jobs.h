@@ -45,9 +45,7 @@ inline std::vector<std::string> slow_precompute(int ranks,
                            "--step-mm",
                            "1",
                            "--codewords",
-                           "20000",
-                           "--max-iterations",
-                           "6",
+                           "10000",
                            "--study"})
     command.emplace_back(word);
   command.push_back((study_folder / "study.toml").string());

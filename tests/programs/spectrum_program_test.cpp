@@ -142,7 +142,7 @@ TEST_F(SpectrumPrograms, AtlasesGiveTheDrrsOfTheirMembersFields) {
       static_cast<std::size_t>(std::max_element(weights.begin(), weights.end()) - weights.begin());
   ASSERT_EQ(weights[middle], 1.0);
   XrayBeamOptions options;
-  options.spectrum = {70.0, 2.5, options.spectrum.energy_bins};
+  options.spectrum = {70.0, 2.5};
   const auto renderer =
       XrayBeam(options, {all.identity().mu_water_per_mm, all.identity().air_below_hu})
           .renderer(make_field_renderer(all.member(middle, alone), all.info().look_up),

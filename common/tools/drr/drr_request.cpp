@@ -110,10 +110,6 @@ void describe_output(Fields& field, DrrOptions& options) {
   field("compare",
         options.compare,
         "Field, ray cast, difference and PSNR in one PNG (needs --field and --ct)");
-  field("invert", options.invert, "PNG: dark is attenuated, the look of a film");
-  field("window_percent",
-        options.window_percent,
-        "PNG: low,high percentile of the DRR that become black and white");
   field("threads",
         options.threads,
         "Threads that share a large DRR, or the DRRs of --poses; 0: every processor");
@@ -194,10 +190,6 @@ void append_output_problems(const DrrOptions& options, std::vector<std::string>&
                     ": a stack of poses must be .mha, .nii.gz, .nrrd or .tif");
   if (options.compare && !is_png)
     found.push_back("output = " + options.output.string() + ": a comparison must be .png");
-  const auto [low, high] = options.window_percent;
-  if (!(low >= 0.0 && high <= 100.0 && low < high))
-    found.push_back("--window-percent = " + number_text(low) + "," + number_text(high) +
-                    ": must be 0 <= low < high <= 100");
 }
 
 struct CastCt {
@@ -246,11 +238,6 @@ CastCt ray_caster(const DrrOptions& options,
   }
   return {cast_through(std::make_shared<const AttenuationVolume>(ct, model), options, pool),
           ct.grid.center_mm()};
-}
-
-Image2d negated(Image2d image) {
-  for (float& value : image.pixels) value = -value;
-  return image;
 }
 
 void require_same_subject(const FieldIdentity& wanted,
@@ -404,6 +391,11 @@ std::vector<Image2d> render_poses(const DrrRenderer& renderer,
   return drrs;
 }
 
+/// What a PNG shows: all but outliers.
+std::array<double, 2> shown_window(const Image2d& image) {
+  return percentile_window(image, 0.5, 99.5);
+}
+
 /// One DRR, a stack of several, or a PNG, by the name's extension. Returns a line about it.
 std::string write_drrs(const std::vector<Image2d>& drrs,
                        const View& view,
@@ -412,21 +404,12 @@ std::string write_drrs(const std::vector<Image2d>& drrs,
   std::ostringstream line;
   line << options.output.string() << ": " << drrs.front().width << " x " << drrs.front().height;
   if (ends_with(options.output, ".png")) {
-    const auto [low, percentile] =
-        percentile_window(drrs.front(), options.window_percent[0], options.window_percent[1]);
+    const auto [low, percentile] = shown_window(drrs.front());
     // A DRR of one value shows nothing, as when the CT is out of view.
     const double high = percentile > low ? percentile : low + 1.0;
-    // Attenuated pixels are bright, as in the other formats; --invert gives the look of a film.
-    if (options.invert)
-      write_png_image(negated(drrs.front()), options.output, -high, -low);
-    else
-      write_png_image(drrs.front(), options.output, low, high);
+    write_png_image(drrs.front(), options.output, low, high);
     line << (percentile > low ? "" : ", constant: the CT is out of view") << ", U "
-         << fixed_text(low, 3) << (options.invert ? " (white) to " : " (black) to ")
-         << fixed_text(high, 3)
-         << (options.invert ? " (black), percentiles " : " (white), percentiles ")
-         << number_text(options.window_percent[0]) << " and "
-         << number_text(options.window_percent[1]);
+         << fixed_text(low, 3) << " (black) to " << fixed_text(high, 3) << " (white)";
   } else if (options.poses.empty()) {
     write_image(drrs.front(), options.output, spacing.x(), spacing.y());
     line << ", total attenuation U as float32";
@@ -448,8 +431,8 @@ std::string write_comparison(const DrrScene& scene,
   const std::optional<Psnr> quality = psnr(field.pixels, cast.pixels);
   Image2d difference = field;
   for (std::size_t i = 0; i < difference.pixels.size(); ++i) difference.pixels[i] -= cast.pixels[i];
-  const auto window = percentile_window(cast, 0.5, 99.5);
-  const auto limits = percentile_window(difference, 0.5, 99.5);
+  const auto window = shown_window(cast);
+  const auto limits = shown_window(difference);
   const double largest = std::max({std::abs(limits[0]), std::abs(limits[1]), 1e-6});
   std::string words = "no pixel in the foreground";
   if (quality.has_value())

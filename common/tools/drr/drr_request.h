@@ -36,9 +36,7 @@ struct DrrOptions {
   RayCasterOptions ray_caster;
   XrayBeamOptions beam;
   bool compare = false;
-  bool invert = false;
-  std::array<double, 2> window_percent = {0.5, 99.5};  ///< of PNG files
-  int threads = 1;                                     ///< 0: every processor
+  int threads = 1;  ///< 0: every processor
   std::filesystem::path output;
 
   void describe(Fields& field_list);

@@ -70,10 +70,7 @@ void ScanOptions::describe(Fields& field) {
 }
 
 std::vector<std::string> problems(const ScanOptions& options) {
-  std::vector<std::string> found = field_problems(options);
-  if (options.calibration.coarse_px <= options.calibration.fine_px)
-    found.push_back("coarse-px must be above fine-px");
-  return found;
+  return field_problems(options);
 }
 
 }  // namespace af::tools

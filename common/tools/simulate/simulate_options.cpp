@@ -6,7 +6,6 @@
 
 #include "base/number_text.h"
 #include "gold_standard/target_box.h"
-#include "simulation/automatic_target.h"
 #include "simulation/phantom.h"
 
 namespace af::tools {
@@ -64,11 +63,9 @@ void describe_target(Fields& field, SimulateOptions& o) {
       .comma_separated();
   field("target_box_ct_mm",
         o.target_box_ct_mm,
-        "Box over which TRE is taken: low x,y,z, high x,y,z (LPS, mm)")
+        "Box over which TRE is taken: low x,y,z, high x,y,z (LPS, mm). Default: 60 mm a side")
       .count(6)
       .comma_separated();
-  field("target_side_mm", o.target_side_mm, "Side of the automatic target box, mm")
-      .within(1.0, 1000.0);
   field("roi_px",
         o.roi_px,
         "Width,height of the region of interest on each detector, centred on the projected target. "
@@ -90,10 +87,6 @@ void describe_truth(Fields& field, SimulateOptions& o) {
         "... and moved by at most this along each axis, mm")
       .within(0.0, 1000.0);
   field("no_fiducials", o.omits_fiducials, "No steel pins (four of 2 x 6 mm otherwise)");
-  field("fiducial_sigma_px",
-        o.fiducial_sigma_px,
-        "Standard deviation of fiducial detections in column and row, px")
-      .within(0.0, 100.0);
 }
 
 void append_scan_problems(const SimulateOptions& options, std::vector<std::string>& found) {
@@ -103,8 +96,6 @@ void append_scan_problems(const SimulateOptions& options, std::vector<std::strin
       found.push_back("elevations_deg: apply to scans only; give --cone-beam, too");
     return;
   }
-  if (scan.orbit_deg == 0.0)
-    found.push_back("orbit_deg = 0: must not be 0, because the source must go round the CT");
   if (!options.stress.names.empty())
     found.push_back(
         "stress: applies to studies only; a scan's X-rays have the Imaging effects alone");
@@ -126,9 +117,6 @@ void append_target_problems(const SimulateOptions& options, std::vector<std::str
             target_box_problem({{box[0], box[1], box[2]}, {box[3], box[4], box[5]}});
         !problem.empty())
       found.push_back("target_box_ct_mm: " + problem);
-  const CtBox automatic = target_box_at(Eigen::Vector3d::Zero(), options.target_side_mm).box_ct;
-  if (const std::string problem = target_box_problem(automatic); !problem.empty())
-    found.push_back("target_side_mm = " + number_text(options.target_side_mm) + ": " + problem);
 }
 
 }  // namespace
@@ -136,7 +124,6 @@ void append_target_problems(const SimulateOptions& options, std::vector<std::str
 XraySimulationOptions SimulateOptions::xray_in_force() const {
   XraySimulationOptions in_force = is_ideal ? XraySimulationOptions::ideal() : xray;
   in_force.threads = xray.threads;
-  in_force.rays_per_pixel_side = xray.rays_per_pixel_side;
   in_force.detector = stress.detector(in_force.detector);
   return in_force;
 }
@@ -155,7 +142,6 @@ std::string SimulateOptions::case_name_in_force() const {
 
 std::vector<std::string> problems(const SimulateOptions& options) {
   std::vector<std::string> found = field_problems(options);
-  if (found.empty()) found = problems(options.stress);
   if (options.phantom_options.has_metal && options.phantom.empty())
     found.push_back("metal: applies to --phantom only; a CT has its own metal or none");
   if (options.phantom_options.anatomy_seed && options.phantom.empty())
@@ -180,19 +166,11 @@ void ConeBeamOptions::describe(Fields& field) {
   field(
       "cone_beam",
       views,
-      "Take this many X-rays on a circle about the CT's centre and write a scan for af-scan: "
+      "Take this many X-rays on a circle about the CT's centre, by the rig's first camera, and "
+      "write a scan for af-scan: "
       "scan.toml, an X-ray per view, and ct.nii.gz; X-rays of a phantom show its exact shapes, not "
       "voxels. 0: a study")
       .within(0, 100000);
-  field("scan_camera",
-        camera,
-        "Camera of the rig whose distances and detector the scan has [the first]");
-  field("orbit_deg",
-        orbit_deg,
-        "Angle that the views share; below 0 the source goes round the other way; af-scan needs "
-        "360")
-      .within(-360.0, 360.0);
-  field("first_angle_deg", first_angle_deg, "Angle of the first view").within(-360.0, 360.0);
   field(
       "elevations_deg",
       elevations_deg,
@@ -217,7 +195,7 @@ void SimulateOptions::describe(Fields& field) {
         "with --no-fiducials for pure line integrals");
   field.start_group("");
   field.part(xray);
-  field.start_group("Stress (what real X-rays have; strengths count only where named by --stress)");
+  field.start_group("Stress (what real X-rays have)");
   field.part(stress);
   field.start_group("Cone-beam scan (instead of a study)");
   field.part(cone_beam);

@@ -16,13 +16,10 @@ namespace af::tools {
 /// A cone-beam scan instead of a study.
 struct ConeBeamOptions {
   int views = 0;  ///< 0: a study
-  std::string camera;
-  double orbit_deg = 360.0;
-  double first_angle_deg = 0.0;
   std::vector<double> elevations_deg;
   int elevated_views = 4;
 
-  [[nodiscard]] double step_deg() const { return orbit_deg / views; }
+  [[nodiscard]] double step_deg() const { return 360.0 / views; }
   void describe(Fields& field);
 };
 
@@ -42,13 +39,11 @@ struct SimulateOptions {
 
   std::vector<double> center_ct_mm;      ///< x, y, z
   std::vector<double> target_box_ct_mm;  ///< low x, y, z, high x, y, z
-  double target_side_mm = 60.0;
-  std::vector<int> roi_px;  ///< width, height
+  std::vector<int> roi_px;               ///< width, height
 
   double max_offset_rotation_deg = 5.0;
   double max_offset_translation_mm = 10.0;
   bool omits_fiducials = false;
-  double fiducial_sigma_px = 0.2;
 
   AttenuationModel attenuation;
   XraySimulationOptions xray;

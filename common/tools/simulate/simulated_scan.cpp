@@ -11,6 +11,7 @@
 #include "files/output_file.h"
 #include "image_files/ct_reader.h"
 #include "image_files/image_file.h"
+#include "simulation/automatic_target.h"
 #include "simulation/detector_model.h"
 #include "simulation/xray_simulator.h"
 #include "study/rig_file.h"
@@ -74,7 +75,7 @@ std::string scan_text(const SimulateOptions& options, const CircularScan& scan) 
   text += "rotation_axis = \"rows\"\n";
   text += "beam_foot_px = " + toml_numbers(scan.stated_foot_px()) + "\n";
   text += "view_count = " + std::to_string(orbit.views) + "\n";
-  text += "first_angle_deg = " + toml_number(orbit.first_angle_deg) + "\n";
+  text += "first_angle_deg = 0.0\n";
   text += "step_deg = " + toml_number(orbit.step_deg()) + "\n";
   text += "files = \"view-{:04}.mha\"\n";
   text += "xray_domain = \"intensity\"\n";
@@ -110,21 +111,18 @@ std::vector<double> angles_between(const ConeBeamOptions& orbit) {
   angles_rad.reserve(static_cast<std::size_t>(orbit.elevated_views));
   const int before = orbit.elevated_views / 2;
   for (int i = -before; i < orbit.elevated_views - before; ++i)
-    angles_rad.push_back(kRadPerDeg * (orbit.first_angle_deg + (2 * i + 1) * orbit.step_deg()));
+    angles_rad.push_back(kRadPerDeg * ((2 * i + 1) * orbit.step_deg()));
   return angles_rad;
 }
 
-StudyCase elevated_case(const SimulateOptions& options,
-                        double elevation_deg,
-                        const fs::path& folder) {
+StudyCase elevated_case(double elevation_deg, const fs::path& folder) {
   StudyCase result;
   result.name = "elevation-" + number_text(elevation_deg);
   result.note = "line integrals without noise, " + number_text(elevation_deg) +
                 " degrees above the circle of scan.toml, simulated by af-simulate";
   result.ct = folder / "ct.nii.gz";
   result.gold_room_from_ct = RigidTransform::Identity();
-  const double half = 0.5 * options.target_side_mm;
-  result.target_box_ct = {Eigen::Vector3d::Constant(-half), Eigen::Vector3d::Constant(half)};
+  result.target_box_ct = target_box_at(Eigen::Vector3d::Zero(), kTargetSideMm).box_ct;
   return result;
 }
 
@@ -162,7 +160,7 @@ void write_elevated(const SimulateOptions& options,
   fs::create_directory(folder / "elevated");
   const std::vector<double> angles_rad = angles_between(options.cone_beam);
   for (const double elevation_deg : options.cone_beam.elevations_deg) {
-    StudyCase of_elevation = elevated_case(options, elevation_deg, folder);
+    StudyCase of_elevation = elevated_case(elevation_deg, folder);
     for (std::size_t i = 0; i < angles_rad.size(); ++i) {
       const std::string name = "elevated-" + number_text(elevation_deg) + "-" + std::to_string(i);
       const CameraGeometry camera = elevated_camera(scan, angles_rad[i], elevation_deg, name);
@@ -203,7 +201,7 @@ CircularScan orbit_of(const CameraGeometry& camera,
   scan.axis_along = AxisAlong::Rows;
   scan.beam_foot_px = foot_px;
   for (int view = 0; view < options.views; ++view)
-    scan.angles_rad.push_back(kRadPerDeg * (options.first_angle_deg + view * options.step_deg()));
+    scan.angles_rad.push_back(kRadPerDeg * (view * options.step_deg()));
   return scan;
 }
 

@@ -25,6 +25,8 @@
 #include "run/provenance.h"
 #include "run/terminal.h"
 #include "simulation/automatic_target.h"
+#include "simulation/calibration_error.h"
+#include "simulation/ct_degradation.h"
 #include "simulation/phantom.h"
 #include "simulation/xray_simulator.h"
 #include "study/rig_file.h"
@@ -37,6 +39,9 @@
 namespace af::tools {
 
 namespace {
+
+/// Standard deviation of fiducial detections in column and row.
+constexpr double kFiducialSigmaPx = 0.2;
 
 /// A case before its X-rays are taken: where the patient lies and what is to be found.
 struct SimulatedCase {
@@ -73,10 +78,9 @@ RegistrationTarget chosen_target(const SimulateOptions& options, const CtVolume&
     target.box_ct = {{box[0], box[1], box[2]}, {box[3], box[4], box[5]}};
     target.center_ct_mm = 0.5 * (target.box_ct.low_mm + target.box_ct.high_mm);
   } else if (center.size() == 3) {
-    target = target_box_at({center[0], center[1], center[2]}, options.target_side_mm);
+    target = target_box_at({center[0], center[1], center[2]}, kTargetSideMm);
   } else {
-    target = options.phantom.empty() ? find_target(ct, options.target_side_mm)
-                                     : phantom_of(options).target;
+    target = options.phantom.empty() ? find_target(ct) : phantom_of(options).target;
   }
   if (center.size() == 3) target.center_ct_mm = {center[0], center[1], center[2]};
   return target;
@@ -146,7 +150,7 @@ void add_fiducials(const SimulateOptions& options,
     };
     simulated.exact_fiducials_px.push_back(detected(0.0));
     refuse_pins_off_detector(camera, simulated.exact_fiducials_px.back());
-    study_case.views[i].fiducials_px = detected(options.fiducial_sigma_px);
+    study_case.views[i].fiducials_px = detected(kFiducialSigmaPx);
     // An evaluation knows only the study's cameras.
     views.push_back({rig.cameras[i], study_case.views[i].fiducials_px});
   }
@@ -164,7 +168,7 @@ CameraRig true_rig(const SimulateOptions& options,
     camera = camera_with_calibration_error(camera,
                                            *study_case.gold_room_from_ct,
                                            study_case.target_box_ct,
-                                           options.stress.calibration_error_px,
+                                           kCalibrationErrorPx,
                                            options.seed,
                                            view_key(study_case.name, camera.name, "calibration"));
   return result;
@@ -180,10 +184,10 @@ void add_occluders(const SimulateOptions& options, const CameraRig& rig, Simulat
       occluder_site(views, *study_case.gold_room_from_ct, study_case.center_ct_mm);
   const auto key = [&](const char* what) { return view_key(study_case.name, "", what); };
   if (stress.has(Stress::Rods))
-    simulated.occluders.cylinders = place_rods(site, stress.occluders, options.seed, key("rods"));
+    simulated.occluders.cylinders = place_rods(site, {}, options.seed, key("rods"));
   if (stress.has(Stress::Fiducials))
     simulated.occluders.balls =
-        place_balls(site, simulated.fiducials, stress.occluders, options.seed, key("balls"));
+        place_balls(site, simulated.fiducials, {}, options.seed, key("balls"));
 }
 
 /// The X-ray as people look at it: bone bright, the window over the middle 98 % of the pixels.
@@ -289,7 +293,7 @@ SimulatedCase plan_case(const SimulateOptions& options,
 std::optional<SmoothMotion> wanted_motion(const SimulateOptions& options,
                                           const SimulatedCase& simulated) {
   if (!options.stress.has(Stress::Motion)) return std::nullopt;
-  SmoothMotionOptions motion = options.stress.motion;
+  SmoothMotionOptions motion;
   motion.threads = options.xray.threads;
   const StudyCase& study_case = simulated.study_case;
   return SmoothMotion(
@@ -335,7 +339,7 @@ std::optional<CtVolume> degraded_study_ct(const SimulateOptions& options,
                                           const CtVolume& ct,
                                           const SimulatedCase& simulated) {
   if (!options.stress.has(Stress::DegradedCt)) return std::nullopt;
-  CtDegradationOptions degradation = options.stress.degraded_ct;
+  CtDegradationOptions degradation;
   degradation.threads = options.xray.threads;
   return degraded_ct(ct,
                      degradation,
@@ -507,9 +511,7 @@ void take_scan(const SimulateOptions& options,
                const CameraRig& rig,
                const Provenance& provenance,
                const std::filesystem::path& folder) {
-  const CameraGeometry& camera =
-      options.cone_beam.camera.empty() ? rig.cameras.front() : rig.camera(options.cone_beam.camera);
-  const CircularScan scan = orbit_of(camera, rig.isocenter_point, options.cone_beam);
+  const CircularScan scan = orbit_of(rig.cameras.front(), rig.isocenter_point, options.cone_beam);
   std::optional<Phantom> bodies;
   if (!options.phantom.empty()) bodies = phantom_of(options);
   ProgressPrinter printer("Taking X-rays", true);

@@ -76,8 +76,6 @@ TEST(SelfCalibration, FollowsWhatItsViewsCanTell) {
   EXPECT_EQ(options.basis_for(scan, 30).size(), 8);
   std::swap(scan.angles_rad[3], scan.angles_rad[90]);  // views whose angles do not tell time
   EXPECT_EQ(options.basis_for(scan, 30).size(), 7);
-  options.omits_drift = true;
-  EXPECT_EQ(options.basis_for(small_scan(), 30).size(), 7);
 }
 
 TEST(SelfCalibration, RefusesAScanThatTurnsTheOtherWay) {

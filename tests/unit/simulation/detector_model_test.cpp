@@ -169,14 +169,12 @@ TEST(DetectorOptions, ReportsEveryBrokenConstraint) {
   EXPECT_TRUE(problems(DetectorOptions{}).empty());
   DetectorOptions bad;
   bad.scatter_to_primary_ratio = -0.1;
-  bad.scatter_sigma_mm = 0.0;
   bad.photons_per_pixel = std::nan("");
   bad.blur_sigma_px = 51.0;
   bad.bits = 7;
   bad.open_beam_level = 0.0;
   EXPECT_THAT(problems(bad),
               ::testing::ElementsAre(::testing::HasSubstr("scatter_to_primary = -0.1"),
-                                     ::testing::HasSubstr("scatter_sigma_mm = 0"),
                                      ::testing::HasSubstr("photons_per_pixel = nan"),
                                      ::testing::HasSubstr("blur_sigma_px = 51"),
                                      ::testing::HasSubstr("bits = 7"),

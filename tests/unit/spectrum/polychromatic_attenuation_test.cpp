@@ -26,7 +26,7 @@ const TissueModel& usual_tissue() {
 /// Tube voltage and filter.
 class PolychromaticAttenuationOf : public testing::TestWithParam<std::tuple<double, double>> {
  protected:
-  SpectrumOptions options_{std::get<0>(GetParam()), std::get<1>(GetParam()), 40};
+  SpectrumOptions options_{std::get<0>(GetParam()), std::get<1>(GetParam())};
   PolychromaticAttenuation attenuation_{options_, usual_tissue()};
 };
 

@@ -29,7 +29,7 @@ TEST(MethodOptions, ReplaceWhatThePresetSays) {
   EXPECT_EQ(stages[0].optimizer, "best-neighbor");
   EXPECT_EQ(method.max_evaluations, 77);
   EXPECT_EQ(method.seed, 9U);
-  options.bins = 1;
+  options.max_evaluations = 0;
   EXPECT_THROW(resolve(options), InputError);
 }
 
@@ -85,11 +85,11 @@ TEST(MethodOptions, InForceAreTheSameMethodAgain) {
   for (const std::string& preset : preset_names()) {
     MethodOptions options;
     options.preset = preset;
-    options.bins = 32;
+    options.similarity = "ncc";
     options.max_evaluations = 77;
     const std::string text = to_toml(options);
     EXPECT_EQ(to_toml(options.in_force()), text);
-    EXPECT_EQ(text.find("\nbins"), std::string::npos) << text;
+    EXPECT_EQ(text.find("\nsimilarity"), std::string::npos) << text;
   }
 }
 
@@ -113,18 +113,6 @@ TEST(MethodOptions, RefuseAFiducialMaskOfNoSize) {
     MethodOptions options;
     options.fiducial_mask_mm = radius_mm;
     EXPECT_THROW(resolve(options), InputError) << radius_mm;
-  }
-}
-
-TEST(MethodOptions, ScaleOnlyTheRegionsOfCoarseStages) {
-  MethodOptions options;
-  options.preset = "fast";
-  options.coarse_roi_scale = 1.5;
-  const RegistrationOptions plain = preset_options("fast");
-  const RegistrationOptions method = resolve(options);
-  for (std::size_t i = 0; i < plain.chains[0].stages.size(); ++i) {
-    const double before = plain.chains[0].stages[i].roi_scale;
-    EXPECT_EQ(method.chains[0].stages[i].roi_scale, before > 1.0 ? 1.5 : before);
   }
 }
 
