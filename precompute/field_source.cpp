@@ -7,7 +7,6 @@
 #include "base/error.h"
 #include "base/joined.h"
 #include "pose_files/pose_file.h"
-#include "study/ct_keys.h"
 #include "study/node_ct.h"
 #include "study/rig_file.h"
 #include "study/shared_inputs.h"
@@ -39,7 +38,7 @@ NamedSource source_of_study(const PrecomputeOptions& options, const Study& study
   const StudyCase& study_case = study.find_case(options.case_name);
   NamedSource source;
   source.ct_path = study_case.ct.string();
-  source.ct_reading = ct_reading_in_force(options.ct_reading, study_case.ct_reading);
+  source.ct_reading = study_case.ct_reading;
   source.study_case = study_case;
   source.rig = study.rig;
   source.frame = study_case.frame();

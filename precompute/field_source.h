@@ -23,7 +23,7 @@ namespace af {
 struct FieldSource {
   std::shared_ptr<const AttenuationVolume> volume;
   std::string ct_path;
-  CtReadOptions ct_reading;  ///< in force: typed, or the study's
+  CtReadOptions ct_reading;  ///< typed, or the study's
   CtIdentity ct;
   CameraGeometry camera;
   PoseFrame frame;

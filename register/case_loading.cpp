@@ -153,8 +153,7 @@ void require_field_of_case(const OpenedField& opened,
     require_same_ct(
         path,
         ct->identity,
-        study_case.ct.string() + ", read " +
-            how(ct_reading_in_force(options.ct, study_case.ct_reading)) +
+        study_case.ct.string() + ", read " + how(study_case.ct_reading) +
             " (the field's: " + how(ct_reading_of(opened.info().provenance.options_toml)) + ")",
         identity.ct);
 }
@@ -314,11 +313,8 @@ NodeCt read_node_ct(const StudyCase& study_case,
                     const Communicator& communicator,
                     std::vector<std::string>& warnings) {
   return naming_study_line(study_case.places, "ct", [&] {
-    return read_ct_per_node(study_case.ct,
-                            ct_reading_in_force(options.ct, study_case.ct_reading),
-                            options.attenuation,
-                            communicator,
-                            warnings);
+    return read_ct_per_node(
+        study_case.ct, study_case.ct_reading, options.attenuation, communicator, warnings);
   });
 }
 
@@ -357,11 +353,8 @@ LoadedCase load_case(const Study& study,
     ray_cast = ray_cast_through(volumes, options.ray_caster, options);
   } else if (!options.skip_ct_check) {
     ct = naming_study_line(study_case.places, "ct", [&] {
-      return read_ct_facts(study_case.ct,
-                           ct_reading_in_force(options.ct, study_case.ct_reading),
-                           options.attenuation,
-                           communicator,
-                           loaded.warnings);
+      return read_ct_facts(
+          study_case.ct, study_case.ct_reading, options.attenuation, communicator, loaded.warnings);
     });
   }
   if (ct.has_value())
@@ -379,8 +372,7 @@ LoadedCase load_case(const Study& study,
 
   if (ct.has_value()) {
     loaded.inputs["ct"] = ct->identity;
-    loaded.input_notes["ct"] =
-        "read " + how(ct_reading_in_force(options.ct, study_case.ct_reading));
+    loaded.input_notes["ct"] = "read " + how(study_case.ct_reading);
     problem->scaling_points_ct = ct_lattice_points(ct->grid);
     problem->cut_points_ct = ct->cut_points_ct;
   } else {

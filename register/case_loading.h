@@ -10,7 +10,6 @@
 
 #include "base/thread_pool.h"
 #include "drr/xray_beam.h"
-#include "image_files/ct_reader.h"
 #include "parallel/communicator.h"
 #include "register/method/registration.h"
 #include "run/input_identity.h"
@@ -29,8 +28,7 @@ const char* to_string(RendererKind kind);
 struct CaseLoadOptions {
   RendererKind renderer = RendererKind::Field;
   std::map<std::string, std::filesystem::path> field_paths;  ///< camera -> field, over the study's
-  CtReadOptions ct;
-  AttenuationModel attenuation;  ///< of ray casting
+  AttenuationModel attenuation;                              ///< of ray casting
   RayCasterOptions ray_caster;
   /// The beam whose X-rays DRRs imitate; where it has a spectrum, bone_field_path() of each field
   /// is read, too.

@@ -56,7 +56,6 @@ void RegisterOptions::describe(Fields& field) {
       "Attenuation of water, 1/mm, for ray casting (a field has its own)";
   field.part(ray_caster);
   field.part(beam);
-  field.part(ct);
   field("skip_ct_check",
         skip_ct_check,
         "Do not read the CT (it may be absent): fields are trusted to be of this case");
@@ -111,7 +110,6 @@ CaseLoadOptions case_load_options(const RegisterOptions& options,
   result.coarsest_level = coarsest_level;
   result.renderer = options.renderer == "raycast" ? RendererKind::RayCast : RendererKind::Field;
   result.field_paths = options.fields.by_camera();
-  result.ct = options.ct;
   result.attenuation = options.attenuation;
   result.ray_caster = options.ray_caster;
   result.ray_caster.step_mm = options.correction.cast_step_mm(options.ray_caster.step_mm);

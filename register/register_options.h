@@ -33,7 +33,6 @@ struct RegisterOptions {
   AttenuationModel attenuation;  ///< of ray casting
   RayCasterOptions ray_caster;
   XrayBeamOptions beam;
-  CtReadOptions ct;
   bool skip_ct_check = false;
   cli::ResumeOptions resume;
   std::filesystem::path output_folder;

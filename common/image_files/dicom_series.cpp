@@ -145,8 +145,10 @@ std::vector<DicomElements> chosen_series(const fs::path& folder,
             std::to_string(files.size()) + (files.size() == 1 ? " slice, " : " slices, ") +
             describe(files.front());
   if (series_uid.empty())
-    throw InputError(folder.string() + ": " + std::to_string(by_uid.size()) +
-                     " DICOM series in this folder; choose one with --series UID:" + list);
+    throw InputError(
+        folder.string() + ": " + std::to_string(by_uid.size()) +
+        " DICOM series in this folder; choose one with ct_series in a study, or --series UID:" +
+        list);
   throw InputError(
       "--series", series_uid, "no such series; the folder holds:" + list, folder.string());
 }

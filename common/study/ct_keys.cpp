@@ -93,10 +93,6 @@ OptionTexts stated_texts(const CtReadOptions& reading) {
   return stated;
 }
 
-bool says_what_voxels_hold(const std::string& name) {
-  return name.starts_with("values") || name.starts_with("raw_") || name == "label_hu";
-}
-
 /// Those of the texts that are CtReadOptions, as keys of a study.
 std::string keys_of(const OptionTexts& texts) {
   std::set<std::string> names;
@@ -109,42 +105,10 @@ std::string keys_of(const OptionTexts& texts) {
   return text;
 }
 
-/// Sets a field to another's value, of the same type.
-void set_field(const Field& field, const Field& other) {
-  std::visit([&](auto* value) { *value = *std::get<decltype(value)>(other.value); }, field.value);
-}
-
-bool have_equal_values(const Field& field, const Field& other) {
-  return std::visit([&](auto* value) { return *value == *std::get<decltype(value)>(other.value); },
-                    field.value);
-}
-
 }  // namespace
 
 std::string ct_keys_text(const CtReadOptions& reading) {
   return keys_of(stated_texts(reading));
-}
-
-CtReadOptions ct_reading_in_force(const CtReadOptions& typed, const CtReadOptions& of_study) {
-  CtReadOptions in_force = of_study;
-  CtReadOptions of_command = typed;
-  CtReadOptions usual;
-  // What voxels hold is one statement: "labels" of a study does not go with a typed "mu".
-  const bool replaces_values = typed.values != usual.values;
-  const Fields commanded = fields_of(of_command);
-  const Fields defaults = fields_of(usual);
-  auto command = commanded.begin();
-  auto by_default = defaults.begin();
-  for (const Field& field : fields_of(in_force)) {
-    if (!have_equal_values(*command, *by_default))
-      set_field(field, *command);
-    else if (replaces_values && says_what_voxels_hold(field.name))
-      set_field(field, *by_default);
-    ++command;
-    ++by_default;
-  }
-  throw_if_any(problems(in_force), "how the CT is read, as typed and by the study");
-  return in_force;
 }
 
 CtReadOptions ct_reading_of(const std::string& options_toml) {

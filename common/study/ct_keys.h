@@ -16,11 +16,6 @@ CtReadOptions read_ct_keys(TomlTableReader& reader);
 /// The keys that are not as they are by default, one per line.
 std::string ct_keys_text(const CtReadOptions& reading);
 
-/// How a case's CT is read with the options `typed` on the command line: each of them replaces the
-/// study's; --values other than hu replaces all keys that say what voxels hold. InputError when the
-/// two do not go together.
-CtReadOptions ct_reading_in_force(const CtReadOptions& typed, const CtReadOptions& of_study);
-
 /// How a CT was read, by the options that a field records.
 CtReadOptions ct_reading_of(const std::string& options_toml);
 

@@ -9,7 +9,6 @@
 #include "base/error.h"
 #include "base/stored_bytes.h"
 #include "spectrum/bone_volume.h"
-#include "study/ct_keys.h"
 #include "study/target_place.h"
 #include "volume/cut_faces.h"
 
@@ -85,11 +84,9 @@ std::shared_ptr<const AttenuationVolume> bone_per_node(const AttenuationVolume& 
   return bone;
 }
 
-CtVolume read_case_ct(const StudyCase& study_case,
-                      const CtReadOptions& typed,
-                      std::vector<std::string>* warnings) {
+CtVolume read_case_ct(const StudyCase& study_case, std::vector<std::string>* warnings) {
   CtVolume ct = naming_study_line(study_case.places, "ct", [&] {
-    return read_ct(study_case.ct, ct_reading_in_force(typed, study_case.ct_reading), warnings);
+    return read_ct(study_case.ct, study_case.ct_reading, warnings);
   });
   require_target_in_ct(study_case, ct.grid);
   return ct;

@@ -35,11 +35,8 @@ struct NodeCt {
   CtFacts facts;
 };
 
-/// The CT of a case, read as the command line says (`typed`) where it differs from the study.
-/// Errors as read_ct(), with the study's line, and as require_target_in_ct().
-CtVolume read_case_ct(const StudyCase& study_case,
-                      const CtReadOptions& typed,
-                      std::vector<std::string>* warnings = nullptr);
+/// The CT of a case. Errors as read_ct(), with the study's line, and as require_target_in_ct().
+CtVolume read_case_ct(const StudyCase& study_case, std::vector<std::string>* warnings = nullptr);
 
 /// Collective. Rank 0 reads the CT, the other nodes get the voxels; errors as read_ct(), on every
 /// rank. Ranks hold the voxels that their node shares, and no more, but for rank 0: it holds the

@@ -60,6 +60,11 @@ void CtReadOptions::describe(Fields& field) {
         "Replace everything but the body (table, head holder, cables) with air");
 }
 
+void describe_beside_ct(Fields& field, CtReadOptions& options) {
+  field.part(options);
+  for (const Field& part : fields_of(options)) field.at(part.name).needs({"--ct"});
+}
+
 std::vector<std::string> problems(const CtReadOptions& options) {
   std::vector<std::string> found = field_problems(options);
   if ((options.values == "raw") != (options.raw_slope_per_mm != 0.0))

@@ -34,6 +34,9 @@ struct CtReadOptions {
 
 std::vector<std::string> problems(const CtReadOptions& options);
 
+/// The options of a program that takes --ct or --study: a study says itself how its CTs are read.
+void describe_beside_ct(Fields& field, CtReadOptions& options);
+
 /// Numbers of a CT's file as HU.
 class HuConversion {
  public:

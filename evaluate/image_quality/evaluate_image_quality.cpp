@@ -28,7 +28,6 @@
 #include "pose_files/pose_file.h"
 #include "run/run_folder.h"
 #include "run/terminal.h"
-#include "study/ct_keys.h"
 #include "study/node_ct.h"
 #include "study/rig_file.h"
 #include "study/study_file.h"
@@ -404,7 +403,7 @@ std::vector<Target> targets_of(const ImageQualityOptions& options) {
       targets.push_back({study_case->name,
                          *view.field,
                          study_case->ct,
-                         ct_reading_in_force(options.ct_reading, study_case->ct_reading),
+                         study_case->ct_reading,
                          options.output_folder / (study_case->name + "-" + view.camera),
                          study.rig.camera(view.camera)});
     }
@@ -466,7 +465,7 @@ void ImageQualityOptions::describe(Fields& field_list) {
       .at_least(0);
   field_list.part(ray_caster);
   field_list.part(beam);
-  field_list.part(ct_reading);
+  describe_beside_ct(field_list, ct_reading);
   field_list("seed", seed, "Seed of the random poses");
   field_list.part(resume);
   field_list("output", output_folder, "Folder for the results")

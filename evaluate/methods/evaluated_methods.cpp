@@ -30,7 +30,6 @@ void MethodOptions::describe(Fields& field) {
   field.at("water_mu_per_mm").help = "Attenuation of water for ray casting, 1/mm";
   field.part(ray_caster);
   field.part(beam);
-  field.part(ct);
 }
 
 void append_problems(const MethodOptions& options, std::vector<std::string>& found) {

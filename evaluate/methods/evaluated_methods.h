@@ -7,7 +7,6 @@
 
 #include "cli/sub_command.h"
 #include "drr/xray_beam.h"
-#include "image_files/ct_reader.h"
 #include "register/field_paths.h"
 #include "register/method/method_options.h"
 #include "study/study_file.h"
@@ -26,7 +25,6 @@ struct MethodOptions {
   AttenuationModel attenuation;  ///< of ray casting
   RayCasterOptions ray_caster;
   XrayBeamOptions beam;
-  CtReadOptions ct;
 
   /// Renderers in the order of rows: "field" before "raycast".
   [[nodiscard]] std::vector<std::string> chosen_renderers() const;

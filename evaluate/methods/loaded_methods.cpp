@@ -20,7 +20,6 @@ registration::CaseLoadOptions load_options(const MethodOptions& options,
   result.renderer =
       renderer == "field" ? registration::RendererKind::Field : registration::RendererKind::RayCast;
   if (renderer == "field") result.field_paths = options.fields.by_camera();
-  result.ct = options.ct;
   result.fiducial_mask_mm = options.method.fiducial_mask_mm;
   result.attenuation = options.attenuation;
   result.ray_caster = options.ray_caster;

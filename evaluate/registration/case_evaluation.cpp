@@ -410,7 +410,7 @@ void draw_setting(const RegistrationStudyOptions& options,
   constexpr int kMostPixels = 320;
   const StudyPictures pictures = draw_study_pictures(study,
                                                      study_case,
-                                                     read_case_ct(study_case, options.ct),
+                                                     read_case_ct(study_case),
                                                      kMostPixels,
                                                      options.output_folder,
                                                      file_name_part(study_case.name) + "-setting");

@@ -27,7 +27,6 @@
 #include "run/progress_printer.h"
 #include "run/run_folder.h"
 #include "run/terminal.h"
-#include "study/ct_keys.h"
 #include "study/node_ct.h"
 #include "study/study_file.h"
 #include "text/csv_table.h"
@@ -142,7 +141,7 @@ std::vector<Target> targets_of(const FieldParametersOptions& options) {
   const Study study = read_study(base.study);
   const auto target_of = [&](const StudyCase& study_case) {
     Target target{base, study_case.ct.string()};
-    target.base.ct_reading = ct_reading_in_force(base.ct_reading, study_case.ct_reading);
+    target.base.ct_reading = study_case.ct_reading;
     return target;
   };
   if (!base.camera.empty()) return {target_of(study.find_case(base.case_name))};

@@ -21,7 +21,7 @@ void append(const std::vector<std::string>& more, std::vector<std::string>& foun
 
 void describe_source(Fields& field, PrecomputeOptions& options) {
   field("ct", options.ct, "CT: image file or DICOM folder").input();
-  field.part(options.ct_reading);
+  describe_beside_ct(field, options.ct_reading);
   field("rig", options.rig, "Cameras: a rig.toml, or a shipped rig: c-arm-12in, treatment-room")
       .input();
   field("camera",

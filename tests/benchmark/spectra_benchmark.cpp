@@ -14,7 +14,6 @@
 #include "cli/app_main.h"
 #include "register/case_loading.h"
 #include "register/field_paths.h"
-#include "study/ct_keys.h"
 #include "study/study_file.h"
 
 namespace {
@@ -144,7 +143,6 @@ void print_rows(const Options& options, const Communicator& world) {
     for (const Tube& tube : tubes) {
       CaseLoadOptions loading;
       loading.renderer = kind;
-      loading.ct = study_case.ct_reading;
       if (kind == RendererKind::Field) loading.field_paths = options.fields.by_camera();
       loading.ray_caster.step_mm = options.step_mm;
       loading.beam = tube.beam;

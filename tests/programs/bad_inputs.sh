@@ -266,8 +266,10 @@ row 2 '--camera' 'empty text' "${precompute[@]}" --study valid/study.toml --came
 printf -- '--- field ---\n'
 register=("$bin/af-register" --study valid/study.toml -o out/result)
 row 4 'other.af.h5' 'field of another CT' "${register[@]}" --field AP=other.af.h5 --field LAT=other-LAT.af.h5
-row 4 'read with mu = 3e-05 * value + 0.02 per mm' 'field of a CT that is read otherwise' "${register[@]}" \
-  --field AP=AP.af.h5 --field LAT=LAT.af.h5 --values raw --raw-slope-per-mm 0.00003 --raw-offset-per-mm 0.02
+sed 's/^ct = .*/&\nct_values = "raw"\nct_raw_slope_per_mm = 0.00003\nct_raw_offset_per_mm = 0.02/' valid/study.toml >valid/raw.toml
+row 4 'read with mu = 3e-05 * value + 0.02 per mm' 'field of a CT that is read otherwise' "$bin/af-register" \
+  --study valid/raw.toml -o out/result --field AP=AP.af.h5 --field LAT=LAT.af.h5
+row 2 '--body-only' 'reading of a CT beside a study' "$bin/af-drr" --study valid/study.toml --camera AP --body-only -o out/drr.mha
 row 4 'LAT.af.h5' 'field of another camera' "${register[@]}" --field AP=LAT.af.h5 --field LAT=AP.af.h5
 head -c 20000 AP.af.h5 >cut.af.h5
 row 4 'cut.af.h5' 'truncated field' "$bin/af-drr" --field cut.af.h5 -o out/drr.mha

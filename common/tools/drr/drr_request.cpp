@@ -20,7 +20,6 @@
 #include "pose_files/pose_file.h"
 #include "run/terminal.h"
 #include "spectrum/bone_volume.h"
-#include "study/ct_keys.h"
 #include "study/rig_file.h"
 #include "study/study_file.h"
 #include "text/csv_table.h"
@@ -68,7 +67,7 @@ void describe_source(Fields& field, DrrOptions& options) {
       .one_at_a_time();
   field("ct", options.ct, "Cast rays through this CT (DICOM folder, NIfTI, MetaImage, NRRD)")
       .stands_for(PathRole::InputVolume, ".nrrd");
-  field.part(options.ct_reading);
+  describe_beside_ct(field, options.ct_reading);
   field("study",
         options.study,
         "study.toml in place of --ct and --rig: rays are cast through the case's CT, and poses are "
@@ -202,7 +201,7 @@ DrrSource source_of(const DrrOptions& options) {
     const Study study = read_study(options.study);
     const StudyCase& study_case = study.find_case(options.study_case);
     return {study_case.ct,
-            ct_reading_in_force(options.ct_reading, study_case.ct_reading),
+            study_case.ct_reading,
             study.rig.camera(options.camera),
             study_case.frame(),
             study.rig.isocenter_point};

@@ -134,14 +134,13 @@ ordered_json view_json(const StudyCase& study_case,
 
 ordered_json case_json(const StudyCase& study_case,
                        const CameraRig& rig,
-                       const CtReadOptions& ct_reading,
                        std::vector<std::string>& warnings) {
   ordered_json json;
   json["name"] = study_case.name;
   json["ct"] = study_case.ct.string();
   if (const std::string reading = study_case.ct_reading.text(); !reading.empty())
     json["ct_reading"] = reading;
-  const CtIdentity ct = identity_of(read_case_ct(study_case, ct_reading, &warnings));
+  const CtIdentity ct = identity_of(read_case_ct(study_case, &warnings));
   json["center_ct_mm"] = vector_json(study_case.center_ct_mm);
   for (Eigen::Index row = 0; row < 4; ++row)
     json["nominal_room_from_ct"].push_back(
@@ -231,15 +230,14 @@ void inspect_rig(const std::string& name_or_path, Inspection& inspection) {
                               [](const auto& /*camera*/, const auto& /*other*/) { return true; });
 }
 
-void inspect_study(const fs::path& path, const CtReadOptions& options, Inspection& inspection) {
+void inspect_study(const fs::path& path, Inspection& inspection) {
   inspection.kind = "study";
   const Study study = read_study(path, &inspection.warnings);
   inspection.facts["rig"] = rig_json(study.rig, [&](const auto& camera, const auto& other) {
     return have_common_case(study, camera, other);
   });
   for (const StudyCase& study_case : study.cases)
-    inspection.facts["cases"].push_back(
-        case_json(study_case, study.rig, options, inspection.warnings));
+    inspection.facts["cases"].push_back(case_json(study_case, study.rig, inspection.warnings));
 }
 
 void inspect_pose(const fs::path& path, Inspection& inspection) {

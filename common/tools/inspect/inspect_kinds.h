@@ -21,9 +21,7 @@ void inspect_field(const std::filesystem::path& path,
                    const Communicator& communicator,
                    Inspection& inspection);
 void inspect_rig(const std::string& name_or_path, Inspection& inspection);
-void inspect_study(const std::filesystem::path& path,
-                   const CtReadOptions& options,
-                   Inspection& inspection);
+void inspect_study(const std::filesystem::path& path, Inspection& inspection);
 void inspect_pose(const std::filesystem::path& path, Inspection& inspection);
 void inspect_csv(const std::filesystem::path& path, Inspection& inspection);
 void inspect_json(const std::filesystem::path& path, Inspection& inspection);

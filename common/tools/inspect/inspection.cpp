@@ -83,7 +83,7 @@ void refuse_foreign(const fs::path& path, std::string_view beginning) {
 void inspect_text(const fs::path& path, const CtReadOptions& options, Inspection& inspection) {
   const std::string text = first_bytes(path, kMarkedBytes);
   if (!is_text(text)) throw not_recognised(path);
-  if (has_line(text, "[[case]]")) return inspect_study(path, options, inspection);
+  if (has_line(text, "[[case]]")) return inspect_study(path, inspection);
   if (has_line(text, "[[camera]]") || is_matrix_text(text))
     return inspect_rig(path.string(), inspection);
   const std::size_t first = text.find_first_not_of(" \t\r\n");
@@ -306,7 +306,7 @@ DrawnPictures draw_pictures(const fs::path& study_or_ct,
   for (const StudyCase& study_case : study.cases) {
     const std::string stem = file_name_part(study_case.name);
     std::vector<std::string> warnings;
-    const CtVolume ct = read_case_ct(study_case, ct_reading, &warnings);
+    const CtVolume ct = read_case_ct(study_case, &warnings);
     StudyPictures pictures =
         draw_study_pictures(study, study_case, ct, kMostDetectorPixels, folder, stem);
     for (const fs::path& file :

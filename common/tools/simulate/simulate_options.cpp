@@ -18,7 +18,7 @@ void describe_patient(Fields& field, SimulateOptions& o) {
   field("phantom", o.phantom, "Built-in synthetic patient instead of a CT. " + phantom_help())
       .choice(phantom_names())
       .one_of_group("Patient");
-  field.part(o.ct_reading);
+  describe_beside_ct(field, o.ct_reading);
   field.part(o.phantom_options);
   field("rig",
         o.rig,

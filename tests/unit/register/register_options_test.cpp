@@ -44,16 +44,13 @@ TEST(RegisterOptions, FieldsAreSplitAtTheFirstEqualsSign) {
   EXPECT_EQ(case_load_options(options).field_paths.at("A"), "x=y.h5");
 }
 
-TEST(RegisterOptions, InForceAreTomlWithTheSeries) {
+TEST(RegisterOptions, InForceAreToml) {
   RegisterOptions options;
   options.study = "a\tb\n\x7f\"\\.toml";
   options.fields.texts = {"A=line\nbreak.h5"};
-  EXPECT_EQ(to_toml(options).find("series"), std::string::npos);
-  options.ct.series_uid = "1.2.3";
   const std::string text = to_toml(options);
-  for (const char* line : {"series = \"1.2.3\"\n",
-                           R"(study = "a\u0009b\u000A\u007F\"\\.toml")",
-                           "field = [\"A=line\\u000Abreak.h5\"]\n"})
+  for (const char* line :
+       {R"(study = "a\u0009b\u000A\u007F\"\\.toml")", "field = [\"A=line\\u000Abreak.h5\"]\n"})
     EXPECT_NE(text.find(line), std::string::npos) << line << " in " << text;
 }
 
@@ -63,7 +60,6 @@ TEST(RegisterOptions, InputsDecideByTheirContentAlone) {
   options.study = "other.toml";
   options.fields.texts = {"A=a.h5"};
   options.starts = "starts.csv";
-  options.ct.series_uid = "1.2.3";
   options.method.threads = 3;
   EXPECT_EQ(deciding_options(options), before);
   options.ray_caster.step_mm = 0.7;

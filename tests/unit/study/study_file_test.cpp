@@ -622,28 +622,8 @@ TEST_F(StudyFile, KeepsHowACtIsRead) {
   }
   EXPECT_EQ(ct_keys_text(CtReadOptions()), "");
   CtReadOptions typed;
-  typed.series_uid = "3.4";
-  EXPECT_EQ(ct_reading_in_force(typed, study.cases[0].ct_reading).values, "labels");
-  EXPECT_EQ(ct_reading_in_force(typed, study.cases[0].ct_reading).series_uid, "3.4");
   typed.values = "mu";
-  const CtReadOptions both = ct_reading_in_force(typed, study.cases[0].ct_reading);
-  EXPECT_EQ(both.values, "mu");
-  EXPECT_THAT(both.label_hu, testing::IsEmpty());
-  EXPECT_TRUE(both.resamples);
-  CtReadOptions body;
-  body.keeps_body_only = true;
-  CtReadOptions of_study;
-  of_study.values = "mu";
-  EXPECT_EQ(ct_reading_in_force(body, of_study).values, "mu");
-  EXPECT_TRUE(ct_reading_in_force(body, of_study).keeps_body_only);
-  CtReadOptions water;
-  water.values_water_mu_per_mm = 0.019;
-  EXPECT_EQ(ct_reading_in_force(water, of_study).values_water_mu_per_mm, 0.019);
-  EXPECT_EQ(ct_reading_in_force(water, of_study).values, "mu");
   EXPECT_EQ(ct_reading_of(to_toml(typed)).values, "mu");
-  typed.values = "hu";
-  typed.label_hu = {"1=40"};
-  EXPECT_THROW(ct_reading_in_force(typed, of_study), InputError);
   EXPECT_EQ(ct_reading_of("st_nodes = 3").text(), "");
 }
 
