@@ -90,8 +90,7 @@ Image2d rendered_region(const DrrRenderer& renderer,
   return whole;
 }
 
-void judge_view(const HeldOutOptions& options,
-                const Study& study,
+void judge_view(const Study& study,
                 const StudyCase& study_case,
                 const StudyView& study_view,
                 const std::vector<Predictor>& predictors,
@@ -228,7 +227,7 @@ void run_held_out(const HeldOutOptions& options,
     HeldOutRows found;
     for (const StudyCase* study_case : chosen)
       for (const StudyView& view : study_case->views)
-        judge_view(options, study, *study_case, view, predictors, found);
+        judge_view(study, *study_case, view, predictors, found);
     if (found.rows.empty())
       throw InputError(
           "study", options.study.string(), "no view has all rays of its region in the fields");
