@@ -172,6 +172,22 @@ void check_is_plain_ct(const DicomElements& header, std::vector<std::string>* wa
     warn(warnings, file + ": RescaleType = '" + units + "', read as HU");
 }
 
+/// The frame of reference of the slices that state one. InputError when they differ: positions are
+/// of one space within one frame only.
+std::string frame_of_reference(const std::vector<DicomElements>& headers) {
+  std::string frame;
+  for (const DicomElements& header : headers) {
+    const std::string own = header.text(kDicomFrameOfReference);
+    if (frame.empty()) frame = own;
+    if (!own.empty() && own != frame)
+      throw InputError("FrameOfReferenceUID",
+                       "'" + own + "'",
+                       "must be that of the series' other slices, '" + frame + "'",
+                       header.path().string());
+  }
+  return frame;
+}
+
 Slice slice_of(const DicomElements& header) {
   const std::string file = header.path().string();
   Slice slice;
@@ -479,6 +495,7 @@ DicomCt read_dicom_series(const fs::path& folder,
                           std::vector<std::string>* warnings) {
   const std::vector<DicomElements> headers =
       chosen_series(folder, image_headers(folder, warnings), options.series_uid);
+  (void)frame_of_reference(headers);
   std::vector<Slice> slices;
   bool rescale_missing = false;
   for (const DicomElements& header : headers) {
@@ -533,10 +550,7 @@ DicomCt read_dicom_series(const fs::path& folder,
 }
 
 std::string dicom_frame_of_reference(const fs::path& folder, const std::string& series_uid) {
-  for (const DicomElements& header :
-       chosen_series(folder, image_headers(folder, nullptr), series_uid))
-    if (std::string uid = header.text(kDicomFrameOfReference); !uid.empty()) return uid;
-  return {};
+  return frame_of_reference(chosen_series(folder, image_headers(folder, nullptr), series_uid));
 }
 
 std::string describe_dicom_file(const fs::path& path) {
