@@ -9,7 +9,7 @@ set -euo pipefail
 base_packages=(
   g++-12 cmake ninja-build pkg-config
   libopenmpi-dev openmpi-bin libhdf5-openmpi-dev
-  libinsighttoolkit5-dev libgdcm-dev libtiff-dev zlib1g-dev
+  libinsighttoolkit5-dev libgdcm-dev libpng-dev libtiff-dev zlib1g-dev
   libeigen3-dev libcli11-dev libtomlplusplus-dev nlohmann-json3-dev libnlopt-dev libspdlog-dev libssl-dev libboost-math-dev
   libgtest-dev libgmock-dev
   python3-dev python3-numpy pybind11-dev python3-wheel

@@ -21,7 +21,6 @@
 #include "image_files/dicom_series.h"
 #include "image_files/hu_values.h"
 #include "image_files/image_header.h"
-#include "image_files/itk_image_io.h"
 #include "image_files/stored_image.h"
 #include "text/csv_table.h"
 #include "volume/body_mask.h"
@@ -58,14 +57,11 @@ void check_is_scalar_volume(const RawImage& image, const fs::path& path) {
                      std::to_string(image.channels),
                      "a CT has one value per voxel (RGB, vector or complex image?)",
                      path.string());
-  std::size_t used = image.size.size();
-  while (used > 3 && image.size[used - 1] == 1) --used;
-  if (used > 3)
+  if (const std::size_t used = image.used_axes(3); used != 3)
     throw InputError("dimensions",
                      std::to_string(used),
-                     "a CT is 3-D; this is a series of volumes (4-D)",
+                     used < 3 ? "a CT is 3-D" : "a CT is 3-D; this is a series of volumes (4-D)",
                      path.string());
-  if (used < 3) throw InputError("dimensions", std::to_string(used), "a CT is 3-D", path.string());
 }
 
 CtGrid grid_of(const RawImage& image) {
@@ -97,17 +93,6 @@ CtGrid straightened(const CtGrid& grid) {
   return straight;
 }
 
-double largest_corner_shift_mm(const CtGrid& a, const CtGrid& b) {
-  double largest = 0.0;
-  for (unsigned corner = 0; corner < 8; ++corner) {
-    Eigen::Vector3d index;
-    for (unsigned axis = 0; axis < 3; ++axis)
-      index[axis] = (corner >> axis & 1u) != 0 ? a.size[axis] - 1 : 0;
-    largest = std::max(largest, (a.point_mm(index) - b.point_mm(index)).norm());
-  }
-  return largest;
-}
-
 void add_values(ValueType type, std::span<const std::byte> bytes, HuValues& values) {
   visit_values(type, bytes, [&](const auto span) { values.add_all(span); });
 }
@@ -115,12 +100,11 @@ void add_values(ValueType type, std::span<const std::byte> bytes, HuValues& valu
 /// Converts the voxels piece by piece while the file is read and checked, in one pass.
 void read_values(const fs::path& path,
                  const ImageHeader& header,
-                 const RawImage& image,
                  HuValues& values,
                  std::vector<std::string>& warnings) {
-  read_described_values(path, header, image, &warnings, [&](std::span<const std::byte> piece) {
-    if (values.hu().empty()) values.reserve(image.voxel_count());
-    add_values(image.type, piece, values);
+  read_described_values(path, header, &warnings, [&](std::span<const std::byte> piece) {
+    if (values.hu().empty()) values.reserve(header.image.voxel_count());
+    add_values(header.image.type, piece, values);
   });
 }
 
@@ -142,12 +126,11 @@ CtVolume read_ct_image(const fs::path& path, HuValues& values, std::vector<std::
   const ImageHeader header = read_image_header(path, *format);
   if (!header.has_spacing)
     throw InputError("spacing", "none", "a CT's header must state it (mm)", file);
-  const RawImage image = image_description(header);
-  check_is_scalar_volume(image, path);
+  check_is_scalar_volume(header.image, path);
   CtVolume ct;
-  ct.grid = sound_grid(grid_of(image), file, &warnings);
+  ct.grid = sound_grid(grid_of(header.image), file, &warnings);
   warnings.insert(warnings.end(), header.warnings.begin(), header.warnings.end());
-  read_values(path, header, image, values, warnings);
+  read_values(path, header, values, warnings);
   if (!header.has_orientation)
     warnings.push_back(file + ": no patient orientation is stored; axes are taken as LPS by " +
                        std::string(format_name(*format)) + "'s default");

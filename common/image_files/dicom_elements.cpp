@@ -16,6 +16,7 @@
 #include "base/toml_text.h"
 #include "files/input_file.h"
 #include "files/input_guard.h"
+#include "image_files/file_bytes.h"
 
 namespace af {
 
@@ -32,7 +33,6 @@ constexpr DicomTag kItemEnd = {0xfffe, 0xe00d};
 constexpr DicomTag kSequenceEnd = {0xfffe, 0xe0dd};
 constexpr DicomTag kTransferSyntax = {0x0002, 0x0010};
 constexpr DicomTag kPixelData = {0x7fe0, 0x0010};
-constexpr DicomTag kIntensitySign = {0x0028, 0x1041};  ///< signed short, in implicit files as well
 constexpr DicomTag kLutDescriptor = {0x0028, 0x3002};
 constexpr DicomTag kLutData = {0x0028, 0x3006};
 constexpr std::uint64_t kLongestLut = 1U << 18;
@@ -53,12 +53,6 @@ bool is_kept_sequence(DicomTag tag) {
                                               {0x0028, 0x9443},
                                               {0x0028, 0x9422}}};
   return std::find(kKept.begin(), kKept.end(), tag) != kKept.end();
-}
-
-/// Of the elements that are read, floats in implicit files.
-bool is_single_float(DicomTag tag) {
-  return tag.first == 0x0018 &&
-         (tag.second == 0x9402 || (tag.second >= 0x9463 && tag.second <= 0x9471));
 }
 
 /// Value representations with a 4-byte length, and those with a 2-byte one (PS3.5, 7.1.2).
@@ -92,12 +86,28 @@ struct Encoding {
   bool is_big_endian = false;
 };
 
-/// Group 0028 elements that are unsigned short in implicit files, whose forms are not written.
-bool is_unsigned_short(DicomTag tag) {
-  constexpr std::array<std::uint16_t, 9> kElements = {
+/// The form of those elements that are read as binary numbers in implicit files, where forms are
+/// not written; empty for the others.
+std::string_view implicit_form(DicomTag tag) {
+  constexpr std::array<std::uint16_t, 9> kUnsigned = {
       0x0002, 0x0010, 0x0011, 0x0100, 0x0101, 0x0102, 0x0103, 0x0120, 0x0121};
-  return tag.first == 0x0028 &&
-         std::find(kElements.begin(), kElements.end(), tag.second) != kElements.end();
+  const auto [group, element] = tag;
+  if (group == 0x0018 && (element == 0x9402 || (element >= 0x9463 && element <= 0x9471)))
+    return "FL";
+  if (group != 0x0028) return "";
+  if (element == 0x1041) return "SS";
+  return std::find(kUnsigned.begin(), kUnsigned.end(), element) != kUnsigned.end() ? "US" : "";
+}
+
+/// Numbers in binary as text, with backslashes between them.
+template <typename Number>
+std::string numbers_text(std::string_view bytes, bool is_big_endian) {
+  const bool is_swapped = is_big_endian != (std::endian::native == std::endian::big);
+  std::string text;
+  for (std::size_t at = 0; at + sizeof(Number) <= bytes.size(); at += sizeof(Number))
+    text += (at > 0 ? "\\" : "") +
+            number_text(static_cast<double>(number_at<Number>(bytes, at, is_swapped)));
+  return text;
 }
 
 }  // namespace
@@ -302,51 +312,26 @@ class DicomWalker {
     if (++nested_values_ > kMostNestedValues) fail("its sequences hold too many values");
   }
 
-  /// IEEE numbers of 4 or 8 bytes.
-  template <typename Float, typename Bits>
-  static std::string float_text(std::string_view bytes, bool is_big_endian) {
-    std::string text;
-    for (std::size_t at = 0; at + sizeof(Bits) <= bytes.size(); at += sizeof(Bits)) {
-      Bits bits = 0;
-      for (std::size_t i = 0; i < sizeof(Bits); ++i) {
-        const std::size_t byte = is_big_endian ? i : sizeof(Bits) - 1 - i;
-        bits = bits << 8 | static_cast<unsigned char>(bytes[at + byte]);
-      }
-      text += (at > 0 ? "\\" : "") + number_text(static_cast<double>(std::bit_cast<Float>(bits)));
-    }
-    return text;
-  }
-
   void keep(const Header& header,
             const std::string& bytes,
             bool is_big_endian,
             int depth,
             DicomValues& into) {
     if (depth > 0) count_nested();
-    const bool is_implicit = header.form.empty();
-    if (header.form == "FL" || (is_implicit && is_single_float(header.tag))) {
-      into.texts_[header.tag] = float_text<float, std::uint32_t>(bytes, is_big_endian);
-      return;
-    }
-    if (header.form == "FD") {
-      into.texts_[header.tag] = float_text<double, std::uint64_t>(bytes, is_big_endian);
-      return;
-    }
+    const std::string_view form =
+        header.form.empty() ? implicit_form(header.tag) : std::string_view(header.form);
     const bool is_lut = header.tag == kLutData || header.tag == kLutDescriptor;
-    const bool is_signed = header.form == "SS" || (is_implicit && header.tag == kIntensitySign);
-    if (header.form != "US" && !is_signed && !(is_implicit && is_unsigned_short(header.tag)) &&
-        !is_lut) {
-      into.texts_[header.tag] = trimmed(bytes);
-      return;
-    }
-    std::string text;
-    for (std::size_t i = 0; i + 2 <= bytes.size(); i += 2) {
-      const auto value =
-          static_cast<std::uint16_t>(number(std::string_view(bytes).substr(i, 2), is_big_endian));
-      text += (i > 0 ? "\\" : "") + (is_signed ? std::to_string(static_cast<std::int16_t>(value))
-                                               : std::to_string(value));
-    }
-    into.texts_[header.tag] = text;
+    std::string& text = into.texts_[header.tag];
+    if (form == "FL")
+      text = numbers_text<float>(bytes, is_big_endian);
+    else if (form == "FD")
+      text = numbers_text<double>(bytes, is_big_endian);
+    else if (form == "SS")
+      text = numbers_text<std::int16_t>(bytes, is_big_endian);
+    else if (form == "US" || is_lut)
+      text = numbers_text<std::uint16_t>(bytes, is_big_endian);
+    else
+      text = trimmed(bytes);
   }
 
   std::string path_;

@@ -2,21 +2,31 @@
 // Bytes of files, plain or deflated, for readers that trust neither.
 #pragma once
 
+#include <algorithm>
+#include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <functional>
+#include <fstream>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
+
+struct z_stream_s;
 
 namespace af {
 
-/// Pieces of a stream, in order.
-using ByteVisitor = std::function<void(std::span<const std::byte>)>;
-
-/// The most bytes that ByteVisitor is given at once by read_plain_file.
-inline constexpr std::size_t kPieceBytes = std::size_t{1} << 20;
+/// The number that stands at `offset`; `is_swapped` against this machine's order of bytes.
+template <typename T>
+T number_at(std::string_view bytes, std::size_t offset, bool is_swapped) {
+  std::array<char, sizeof(T)> raw{};
+  std::copy_n(bytes.data() + offset, sizeof(T), raw.begin());
+  if (is_swapped) std::reverse(raw.begin(), raw.end());
+  return std::bit_cast<T>(raw);
+}
 
 /// The first `bytes` of a file; fewer when there are not as many. FileError when it cannot be read.
 std::string read_prefix(const std::filesystem::path& path, std::size_t bytes);
@@ -26,22 +36,30 @@ bool is_gzip(std::string_view bytes);
 /// First bytes of a file, inflated when it is gzip; fewer when there are not as many.
 std::string read_inflated_prefix(const std::filesystem::path& path, std::size_t bytes);
 
-/// The lengths of a compressed stream.
-struct InflatedBytes {
-  std::uint64_t inflated = 0;
-  std::uint64_t compressed = 0;
+/// Bytes of a file from `offset` on: as they stand there, or those of the zlib stream or of all
+/// members of the gzip file that begins there. What stands behind its end is not looked at.
+class ByteSource {
+ public:
+  ByteSource(const std::filesystem::path& path, std::uint64_t offset, bool is_compressed);
+
+  /// Fills `bytes` as far as there are any; how many there were. FileError when a compressed stream
+  /// is cut or its checksum is wrong.
+  std::size_t read(std::span<std::byte> bytes);
+  /// Reads to the end; how many bytes there were.
+  std::uint64_t drain();
+  /// Bytes of the compressed stream that were read.
+  [[nodiscard]] std::uint64_t compressed_bytes() const;
+
+ private:
+  void refill();
+
+  std::string path_;
+  std::ifstream file_;
+  /// nullptr where nothing is compressed.
+  std::unique_ptr<z_stream_s, void (*)(z_stream_s*)> stream_;
+  std::vector<unsigned char> input_;
+  std::uint64_t taken_ = 0;  ///< of the file
+  bool is_finished_ = false;
 };
-
-/// Inflates a zlib stream, or all members of a gzip file, that begins at `offset`, handing the
-/// bytes to `visit` on the way. What stands behind its end is not looked at. FileError when it is
-/// cut or its checksum is wrong.
-InflatedBytes inflate_file(const std::filesystem::path& path,
-                           std::uint64_t offset,
-                           const ByteVisitor& visit);
-
-/// Reads a file from `offset` to its end in pieces of kPieceBytes; how many bytes there were.
-std::uint64_t read_plain_file(const std::filesystem::path& path,
-                              std::uint64_t offset,
-                              const ByteVisitor& visit);
 
 }  // namespace af

@@ -11,7 +11,6 @@
 #include "base/error.h"
 #include "image_files/dicom_pixels.h"
 #include "image_files/image_header.h"
-#include "image_files/itk_image_io.h"
 #include "image_files/stored_image.h"
 
 namespace af {
@@ -24,46 +23,39 @@ constexpr std::size_t kMaxPixels = std::size_t{1} << 28;  ///< 1 GB as float
 /// Deflate and LZW cannot expand a byte to more than this many.
 constexpr std::size_t kMaxExpansion = 4096;
 
-void check_is_2d(const RawImage& image, const fs::path& path) {
-  std::size_t used = image.size.size();
-  while (used > 2 && image.size[used - 1] == 1) --used;
-  if (used != 2)
-    throw InputError("dimensions", std::to_string(used), "must be a 2-D image", path.string());
+/// Grey images that fit into memory, on the first two axes.
+void check_is_of_images(const RawImage& image, const fs::path& path) {
   if (image.channels != 1)
     throw InputError(
         "channels", std::to_string(image.channels), "must be grey (one channel)", path.string());
-  const std::size_t columns = image.size[0];
-  const std::size_t rows = image.size[1];
-  if (columns == 0 || rows == 0 || columns > kMaxPixels / rows)
+  if (image.size[0] == 0 || image.size[1] == 0 || image.size[0] > kMaxPixels / image.size[1])
     throw InputError("size",
-                     std::to_string(columns) + " x " + std::to_string(rows),
+                     std::to_string(image.size[0]) + " x " + std::to_string(image.size[1]),
                      "must be 1 to 2^28 pixels",
                      path.string());
-  const std::size_t bytes = columns * rows * value_bytes(image.type);
-  std::error_code error;
-  if (bytes / kMaxExpansion > fs::file_size(path, error) && image.directions.size() < 3 &&
-      path.extension() != ".mhd" && path.extension() != ".nhdr")
+}
+
+void check_is_2d(const RawImage& image, const fs::path& path) {
+  if (const std::size_t used = image.used_axes(2); used != 2)
+    throw InputError("dimensions", std::to_string(used), "must be a 2-D image", path.string());
+  check_is_of_images(image, path);
+  // Of other formats the bytes are counted before memory is taken.
+  const bool is_picture = image.directions.empty();
+  const std::size_t bytes = image.voxel_count() * value_bytes(image.type);
+  if (std::error_code error; is_picture && bytes / kMaxExpansion > fs::file_size(path, error))
     throw FileError(path.string(),
-                    "truncated: the file is too small for its " + std::to_string(columns) + " x " +
-                        std::to_string(rows) + " pixels");
+                    "truncated: the file is too small for its " + std::to_string(image.size[0]) +
+                        " x " + std::to_string(image.size[1]) + " pixels");
 }
 
 void check_is_stack(const RawImage& image, const fs::path& path) {
+  constexpr std::size_t kMostImages = 100000;
   if (image.size.size() != 3)
     throw InputError(
         "dimensions", std::to_string(image.size.size()), "must be a 3-D stack", path.string());
-  if (image.channels != 1)
-    throw InputError(
-        "channels", std::to_string(image.channels), "must be grey (one channel)", path.string());
-  const std::size_t columns = image.size[0];
-  const std::size_t rows = image.size[1];
-  constexpr std::size_t kMostImages = 100000;
-  if (columns == 0 || rows == 0 || columns > kMaxPixels / rows || image.size[2] > kMostImages)
-    throw InputError("size",
-                     std::to_string(columns) + " x " + std::to_string(rows) + " x " +
-                         std::to_string(image.size[2]),
-                     "must be images of 1 to 2^28 pixels, at most 100000",
-                     path.string());
+  check_is_of_images(image, path);
+  if (image.size[2] > kMostImages)
+    throw InputError("images", std::to_string(image.size[2]), "at most 100000", path.string());
 }
 
 RawImage raw_image_of(std::vector<std::size_t> size, ValueType type, double dx_mm, double dy_mm) {
@@ -175,7 +167,7 @@ void for_each_image_of_stack(const fs::path& path,
                      "must be MetaImage, NRRD or NIfTI; convert it, or give one file per image",
                      path.string());
   const ImageHeader header = read_image_header(path, *format);
-  const RawImage description = image_description(header);
+  const RawImage& description = header.image;
   check_is_stack(description, path);
   const auto empty = [&] {
     return Image2d(static_cast<int>(description.size[0]), static_cast<int>(description.size[1]));
@@ -191,7 +183,7 @@ void for_each_image_of_stack(const fs::path& path,
     image = empty();
     filled = 0;
   };
-  read_described_values(path, header, description, nullptr, [&](std::span<const std::byte> piece) {
+  read_described_values(path, header, nullptr, [&](std::span<const std::byte> piece) {
     visit_values(description.type, piece, [&](const auto values) {
       for (const auto value : values) add(static_cast<float>(value));
     });

@@ -6,7 +6,6 @@
 #include <filesystem>
 
 #include "image_files/image_header.h"
-#include "image_files/itk_image_io.h"
 
 namespace af::image_formats {
 
@@ -20,13 +19,14 @@ ImageHeader read_nifti_header(const std::filesystem::path& path);
 /// The origin at 0 and axes along the coordinates, where nothing is stated.
 void set_default_place(ImageHeader& header);
 
-/// By ITK, after its chunks and their checksums were walked: libpng ends the process on a damaged
-/// header. Values are those stored, whatever sBIT and tRNS say of them.
+/// By libpng: grey of 1 to 16 bits, values as stored. ITK 5.2 changes them (it stretches 1 to 4
+/// bits, shifts by sBIT, adds alpha by tRNS) and ends the process on a damaged header.
 RawImage read_png(const std::filesystem::path& path, const AcceptImage& accept);
 
 /// By libtiff: grey pages of integers or floats, upright as the orientation tag says, WhiteIsZero
 /// turned round. Several pages are a stack; thumbnails and masks are left out. InputError for
-/// colour, palettes, alpha and for number types that are not read.
+/// colour, palettes, alpha and for number types that are not read. ITK 5.2 ignores all of this but
+/// palettes, and leaves pixels of 32-bit integers as they were in memory.
 RawImage read_tiff(const std::filesystem::path& path, const AcceptImage& accept);
 
 /// Bytes of the voxels that a header promises; FileError when the product overflows or is absurd.

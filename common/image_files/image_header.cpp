@@ -18,7 +18,7 @@ namespace image_formats {
 
 std::uint64_t checked_payload_bytes(const fs::path& path, const ImageHeader& header) {
   std::uint64_t voxels = 1;
-  for (const std::uint64_t extent : header.size) {
+  for (const std::uint64_t extent : header.image.size) {
     if (extent == 0 || voxels > kMaxVoxels / extent)
       throw FileError(path.string(),
                       "image size",
@@ -26,7 +26,7 @@ std::uint64_t checked_payload_bytes(const fs::path& path, const ImageHeader& hea
                       "a header that says more");
     voxels *= extent;
   }
-  return voxels * header.value_bytes;
+  return voxels * header.voxel_bytes();
 }
 
 std::uint64_t existing_file_size(const fs::path& header_path, const fs::path& data_file) {
@@ -40,10 +40,10 @@ std::uint64_t existing_file_size(const fs::path& header_path, const fs::path& da
 }
 
 void set_default_place(ImageHeader& header) {
-  const std::size_t axes = header.size.size();
-  header.origin_mm.assign(axes, 0.0);
-  header.directions.assign(axes, std::vector<double>(axes, 0.0));
-  for (std::size_t axis = 0; axis < axes; ++axis) header.directions[axis][axis] = 1.0;
+  const std::size_t axes = header.image.size.size();
+  header.image.origin_mm.assign(axes, 0.0);
+  header.image.directions.assign(axes, std::vector<double>(axes, 0.0));
+  for (std::size_t axis = 0; axis < axes; ++axis) header.image.directions[axis][axis] = 1.0;
 }
 
 }  // namespace image_formats
@@ -71,21 +71,9 @@ bool looks_like_meta_image(std::string_view header) {
 }  // namespace
 
 std::string_view format_name(ImageFormat format) {
-  switch (format) {
-    case ImageFormat::MetaImage:
-      return "MetaImage";
-    case ImageFormat::Nifti:
-      return "NIfTI";
-    case ImageFormat::Nrrd:
-      return "NRRD";
-    case ImageFormat::Png:
-      return "PNG";
-    case ImageFormat::Tiff:
-      return "TIFF";
-    case ImageFormat::Dicom:
-      return "DICOM";
-  }
-  return "unknown";
+  constexpr std::array<std::string_view, 6> kNames = {
+      "MetaImage", "NIfTI", "NRRD", "PNG", "TIFF", "DICOM"};
+  return kNames.at(static_cast<std::size_t>(format));
 }
 
 std::optional<ImageFormat> sniff_image_format(const fs::path& path) {
@@ -145,6 +133,9 @@ ImageHeader read_image_header(const fs::path& path, ImageFormat format) {
       return header;
   }
   (void)checked_payload_bytes(path, header);
+  header.image.type = header.value_type;
+  if (header.is_rescaled && header.value_type != ValueType::Float64)
+    header.image.type = ValueType::Float32;
   return header;
 }
 

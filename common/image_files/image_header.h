@@ -9,12 +9,12 @@
 #include <string_view>
 #include <vector>
 
+#include "image_files/raw_image.h"
+
 namespace af {
 
 /// Image files that the project reads, told apart by content, not by name.
 enum class ImageFormat { MetaImage, Nifti, Nrrd, Png, Tiff, Dicom };
-
-enum class ValueType { Int8, UInt8, Int16, UInt16, Int32, UInt32, Int64, UInt64, Float32, Float64 };
 
 std::string_view format_name(ImageFormat format);
 
@@ -33,8 +33,8 @@ inline constexpr double kMaxDirectionError = 1e-3;
 /// What can be said of an image file before a library is trusted with it.
 struct ImageHeader {
   ImageFormat format = ImageFormat::MetaImage;
-  std::vector<std::uint64_t> size;   ///< per axis; empty for PNG, TIFF and DICOM
-  std::uint64_t value_bytes = 0;     ///< of one voxel with all its channels
+  /// Without values, of the type that they are read as; nothing for PNG, TIFF and DICOM.
+  RawImage image;
   std::uint64_t payload_offset = 0;  ///< where the (compressed) voxels begin
   std::uint64_t skip_bytes = 0;      ///< in front of the voxels, after decompression
   bool compressed = false;
@@ -47,13 +47,14 @@ struct ImageHeader {
   bool is_rescaled = false;      ///< values are stored * slope + intercept
   double slope = 1.0;
   double intercept = 0.0;
-  int channels = 1;
   bool has_orientation = true;
   bool has_spacing = true;
-  std::vector<double> spacing_mm;               ///< per axis
-  std::vector<double> origin_mm;                ///< LPS, of the first voxel's centre
-  std::vector<std::vector<double>> directions;  ///< LPS, one unit vector per axis
   std::vector<std::string> warnings;
+
+  /// Of one voxel with all its channels, as stored.
+  [[nodiscard]] std::size_t voxel_bytes() const {
+    return value_bytes(value_type) * static_cast<std::size_t>(image.channels);
+  }
 };
 
 /// Reads and checks the header of a MetaImage, NRRD or NIfTI-1 file without allocating by what it

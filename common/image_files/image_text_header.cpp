@@ -4,20 +4,22 @@
 #include <algorithm>
 #include <cctype>
 #include <charconv>
+#include <iterator>
+#include <optional>
 #include <sstream>
 
 #include "base/error.h"
+#include "base/parsed_number.h"
 
 namespace af::image_formats {
 
 namespace {
 
-std::uint64_t checked_extent(const std::string& path, const std::string& text) {
-  std::uint64_t number = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (error != std::errc() || end != text.data() + text.size() || number == 0)
-    throw FileError(path, "size of an axis", "a positive integer", "'" + text + "'");
-  return number;
+std::optional<std::int64_t> parsed_integer(const std::string& text) {
+  std::int64_t number = 0;
+  const char* const end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, number);
+  return error == std::errc() && stop == end ? std::optional(number) : std::nullopt;
 }
 
 }  // namespace
@@ -41,11 +43,27 @@ const std::string& TextHeader::require(const std::string& key) const {
 std::int64_t TextHeader::integer(const std::string& key, std::int64_t fallback) const {
   const std::string* value = find(key);
   if (value == nullptr) return fallback;
-  std::int64_t number = 0;
-  const auto [end, error] = std::from_chars(value->data(), value->data() + value->size(), number);
-  if (error != std::errc() || end != value->data() + value->size())
+  const std::optional<std::int64_t> number = parsed_integer(*value);
+  if (!number)
     throw FileError(path, "header field '" + key + "'", "an integer", "'" + *value + "'");
-  return number;
+  return *number;
+}
+
+std::vector<double> TextHeader::numbers(const std::string& key) const {
+  const std::string* text = find(key);
+  if (text == nullptr) return {};
+  std::vector<double> values;
+  for (const std::string& word : words_of(*text)) {
+    const std::optional<double> value = parsed_number(word);
+    if (!value) throw FileError(path, key, "numbers", "'" + *text + "'");
+    values.push_back(*value);
+  }
+  return values;
+}
+
+std::vector<std::string> words_of(const std::string& text) {
+  std::istringstream words(text);
+  return {std::istream_iterator<std::string>(words), {}};
 }
 
 std::string trimmed(std::string_view text) {
@@ -59,26 +77,31 @@ std::string lower(std::string text) {
   return text;
 }
 
-std::vector<std::uint64_t> parse_sizes(const std::string& path,
-                                       const std::string& text,
-                                       std::int64_t dimension) {
-  std::istringstream words(text);
+std::vector<std::uint64_t> sizes_of(const TextHeader& header,
+                                    const std::string& dimension_key,
+                                    const std::string& sizes_key) {
+  constexpr std::int64_t kMostAxes = 10;
+  (void)header.require(dimension_key);
+  const std::int64_t dimension = header.integer(dimension_key, 0);
+  if (dimension < 1 || dimension > kMostAxes)
+    throw FileError(header.path, dimension_key, "1 to 10", std::to_string(dimension));
+  const std::string& text = header.require(sizes_key);
   std::vector<std::uint64_t> sizes;
-  for (std::string word; words >> word;) sizes.push_back(checked_extent(path, word));
+  for (const std::string& word : words_of(text)) {
+    const std::int64_t size = parsed_integer(word).value_or(0);
+    if (size < 1) throw FileError(header.path, sizes_key, "positive integers", "'" + text + "'");
+    sizes.push_back(static_cast<std::uint64_t>(size));
+  }
   if (static_cast<std::int64_t>(sizes.size()) != dimension)
-    throw FileError(path, "sizes", std::to_string(dimension) + " numbers", "'" + text + "'");
+    throw FileError(
+        header.path, sizes_key, std::to_string(dimension) + " numbers", "'" + text + "'");
   return sizes;
 }
 
-std::int64_t checked_dimension(const TextHeader& header, const std::string& key) {
-  (void)header.require(key);
-  const std::int64_t dimension = header.integer(key, 0);
-  if (dimension < 1 || dimension > 10)
-    throw FileError(header.path, key, "1 to 10", std::to_string(dimension));
-  return dimension;
-}
-
 std::filesystem::path beside(const std::filesystem::path& header_path, const std::string& name) {
+  if (name.starts_with("LIST") || name.find('%') != std::string::npos)
+    throw FileError(header_path.string(),
+                    "its voxel file '" + name + "': one file per slice is not supported");
   const std::filesystem::path data(name);
   if (data.is_absolute() || std::find(data.begin(), data.end(), "..") != data.end())
     throw FileError(header_path.string(),

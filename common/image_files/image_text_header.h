@@ -29,22 +29,26 @@ struct TextHeader {
   [[nodiscard]] const std::string& require(const std::string& key) const;
   /// FileError when it is no integer.
   [[nodiscard]] std::int64_t integer(const std::string& key, std::int64_t fallback) const;
+  /// Numbers between blanks, of any count and value; none when the header does not have the key.
+  /// FileError when it holds anything else.
+  [[nodiscard]] std::vector<double> numbers(const std::string& key) const;
 };
+
+std::vector<std::string> words_of(const std::string& text);
 
 /// Without blanks at both ends.
 std::string trimmed(std::string_view text);
 std::string lower(std::string text);
 
-/// `dimension` positive integers; FileError when `text` holds anything else.
-std::vector<std::uint64_t> parse_sizes(const std::string& path,
-                                       const std::string& text,
-                                       std::int64_t dimension);
-
-/// The number of axes under `key`, 1 to 10.
-std::int64_t checked_dimension(const TextHeader& header, const std::string& key);
+/// Voxels per axis, of 1 to 10 axes. FileError when they are no positive integers or not as many
+/// as the header says.
+std::vector<std::uint64_t> sizes_of(const TextHeader& header,
+                                    const std::string& dimension_key,
+                                    const std::string& sizes_key);
 
 /// The voxel file that a header names, relative to the header. FileError when that leads out of the
 /// header's folder: an image from elsewhere must not show the content of the reader's other files.
+/// FileError for one file per slice, too.
 std::filesystem::path beside(const std::filesystem::path& header_path, const std::string& name);
 
 }  // namespace af::image_formats

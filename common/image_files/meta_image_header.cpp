@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
@@ -10,11 +11,9 @@
 
 #include "base/error.h"
 #include "base/number_text.h"
-#include "base/parsed_number.h"
 #include "image_files/file_bytes.h"
 #include "image_files/image_formats.h"
 #include "image_files/image_text_header.h"
-#include "image_files/itk_image_io.h"
 
 namespace af::image_formats {
 
@@ -23,29 +22,21 @@ namespace fs = std::filesystem;
 namespace {
 
 TextHeader parse_meta_text(const fs::path& path) {
-  const std::string text = read_prefix(path, kMaxTextHeaderBytes);
+  const std::string bytes = read_prefix(path, kMaxTextHeaderBytes);
+  std::istringstream text(bytes);
   TextHeader header{path.string(), {}, 0};
-  std::size_t at = 0;
-  while (at < text.size()) {
-    const std::size_t end = text.find('\n', at);
-    if (end == std::string::npos) {
-      // A header file may end without a newline after its last line.
-      if (text.size() == kMaxTextHeaderBytes || text.find('\0', at) != std::string::npos) break;
-    }
-    const std::string_view line =
-        std::string_view(text).substr(at, end == std::string::npos ? std::string::npos : end - at);
-    at = end == std::string::npos ? text.size() : end + 1;
+  for (std::string line; std::getline(text, line);) {
+    // A header file may end without a newline after its last line.
+    const bool is_cut = bytes.size() == kMaxTextHeaderBytes || line.find('\0') != std::string::npos;
+    if (text.eof() && is_cut) break;
     const auto separator = line.find_first_of("=:");
-    if (separator == std::string_view::npos) {
-      if (trimmed(line).empty()) continue;
-      break;
-    }
+    if (separator == std::string::npos && trimmed(line).empty()) continue;
+    if (separator == std::string::npos) break;
     const std::string key = trimmed(line.substr(0, separator));
     header.add(key, trimmed(line.substr(separator + 1)));
-    if (key == "ElementDataFile") {
-      header.end_offset = at;
-      return header;
-    }
+    if (key != "ElementDataFile") continue;
+    header.end_offset = text.eof() ? bytes.size() : static_cast<std::uint64_t>(text.tellg());
+    return header;
   }
   throw FileError(path.string(), "MetaImage header ends without ElementDataFile");
 }
@@ -86,15 +77,9 @@ std::vector<double> meta_numbers(const TextHeader& header,
   for (const std::string key : keys) {
     const std::string* text = header.find(key);
     if (text == nullptr) continue;
-    std::vector<double> numbers;
-    std::istringstream words(*text);
-    for (std::string word; words >> word;) {
-      const std::optional<double> value = parsed_number(word);
-      if (!value) throw FileError(header.path, key, "numbers", "'" + *text + "'");
-      if (!std::isfinite(*value))
-        throw InputError(key, "'" + *text + "'", "must be finite", header.path);
-      numbers.push_back(*value);
-    }
+    const std::vector<double> numbers = header.numbers(key);
+    if (!std::ranges::all_of(numbers, [](double value) { return std::isfinite(value); }))
+      throw InputError(key, "'" + *text + "'", "must be finite", header.path);
     if (numbers.size() != expected)
       throw FileError(header.path, key, std::to_string(expected) + " numbers", "'" + *text + "'");
     if (found.empty())
@@ -107,19 +92,21 @@ std::vector<double> meta_numbers(const TextHeader& header,
 
 /// Where the image lies. MetaIO stores one axis direction after the other.
 void read_meta_place(const TextHeader& text, ImageHeader& header) {
-  const std::size_t axes = header.size.size();
+  const std::size_t axes = header.image.size.size();
   set_default_place(header);
   if (const auto origin = meta_numbers(text, {"Offset", "Position", "Origin"}, axes);
       !origin.empty())
-    header.origin_mm = origin;
+    header.image.origin_mm = origin;
   const auto matrix =
       meta_numbers(text, {"TransformMatrix", "Rotation", "Orientation"}, axes * axes);
   header.has_orientation = !matrix.empty();
-  for (std::size_t i = 0; i < matrix.size(); ++i) header.directions[i / axes][i % axes] = matrix[i];
-  header.spacing_mm = meta_numbers(text, {"ElementSpacing"}, axes);
-  if (header.spacing_mm.empty()) header.spacing_mm = meta_numbers(text, {"ElementSize"}, axes);
-  header.has_spacing = !header.spacing_mm.empty();
-  header.spacing_mm.resize(axes, 1.0);
+  for (std::size_t i = 0; i < matrix.size(); ++i)
+    header.image.directions[i / axes][i % axes] = matrix[i];
+  header.image.spacing_mm = meta_numbers(text, {"ElementSpacing"}, axes);
+  if (header.image.spacing_mm.empty())
+    header.image.spacing_mm = meta_numbers(text, {"ElementSize"}, axes);
+  header.has_spacing = !header.image.spacing_mm.empty();
+  header.image.spacing_mm.resize(axes, 1.0);
   const std::string* const unit = text.find("DistanceUnits");
   if (unit != nullptr && lower(*unit) != "mm")
     throw InputError("DistanceUnits", "'" + *unit + "'", "lengths must be in mm", text.path);
@@ -181,27 +168,20 @@ ImageHeader read_meta_header(const fs::path& path) {
   const TextHeader text = parse_meta_text(path);
   ImageHeader header;
   header.format = ImageFormat::MetaImage;
-  const std::int64_t dimension = checked_dimension(text, "NDims");
-  header.size = parse_sizes(text.path, text.require("DimSize"), dimension);
+  header.image.size = sizes_of(text, "NDims", "DimSize");
   read_meta_place(text, header);
   check_meta_intensity(text);
   const std::int64_t channels = text.integer("ElementNumberOfChannels", 1);
   if (channels < 1 || channels > 1024)
     throw FileError(text.path, "ElementNumberOfChannels", "1 to 1024", std::to_string(channels));
   header.value_type = meta_value_type(text);
-  header.channels = static_cast<int>(channels);
-  header.value_bytes = value_bytes(header.value_type) * static_cast<std::uint64_t>(channels);
+  header.image.channels = static_cast<int>(channels);
   header.is_byte_swapped = is_meta_byte_swapped(text);
   if (!is_true(text, "BinaryData", true))
     throw FileError(text.path, "BinaryData = False: text voxels are not supported");
   header.compressed = is_true(text, "CompressedData", false);
   const std::string& data_file = text.require("ElementDataFile");
-  const std::string kind = lower(data_file);
-  if (kind.starts_with("list") || data_file.find('%') != std::string::npos)
-    throw FileError(text.path,
-                    "ElementDataFile = " + data_file +
-                        ": one file per slice is not supported; give one raw file");
-  const bool local = kind == "local";
+  const bool local = lower(data_file) == "local";
   header.data_file = local ? path : beside(path, data_file);
   const std::uint64_t bytes = existing_file_size(path, header.data_file);
   header.payload_offset = meta_payload_offset(text, header, local, bytes);

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <array>
-#include <bit>
 #include <cmath>
 #include <map>
 
@@ -11,7 +9,6 @@
 #include "base/plausible.h"
 #include "image_files/file_bytes.h"
 #include "image_files/image_formats.h"
-#include "image_files/itk_image_io.h"
 #include "text/csv_table.h"
 #include "volume/ct_identity.h"
 
@@ -27,14 +24,6 @@ constexpr float kMaxSlope = 1e6f;
 /// corners of a volume 500 mm wide.
 constexpr double kMaxPlaceDifferenceMm = 0.05;
 constexpr std::size_t kNifti2HeaderBytes = 540;
-
-template <typename T>
-T load(std::string_view bytes, std::size_t offset, bool swapped) {
-  std::array<char, sizeof(T)> raw{};
-  std::copy_n(bytes.data() + offset, sizeof(T), raw.begin());
-  if (swapped) std::reverse(raw.begin(), raw.end());
-  return std::bit_cast<T>(raw);
-}
 
 /// A voxel's type: of each channel, and how many there are.
 struct NiftiType {
@@ -61,59 +50,51 @@ NiftiType nifti_type(const std::string& path, int datatype) {
   return found->second;
 }
 
-using Affine = Eigen::Affine3d;  ///< of voxel index to RAS+ mm
-
-Affine qform_affine(std::string_view raw, bool swapped) {
+/// Maps of voxel index to RAS+ mm: grids of spacing 1 whose axes are as long as voxels.
+CtGrid qform_map(std::string_view raw, bool swapped) {
   const auto at = [&](std::size_t offset) {
-    return static_cast<double>(load<float>(raw, offset, swapped));
+    return static_cast<double>(number_at<float>(raw, offset, swapped));
   };
   const Eigen::Vector3d q(at(256), at(260), at(264));
   const double w = std::sqrt(std::max(0.0, 1.0 - q.squaredNorm()));
   const double handedness = at(76) < 0.0 ? -1.0 : 1.0;
-  Affine affine = Affine::Identity();
-  affine.linear() = Eigen::Quaterniond(w, q.x(), q.y(), q.z()).normalized().toRotationMatrix() *
-                    Eigen::Vector3d(at(80), at(84), handedness * at(88)).asDiagonal();
-  affine.translation() << at(268), at(272), at(276);
-  return affine;
+  CtGrid map;
+  map.direction = Eigen::Quaterniond(w, q.x(), q.y(), q.z()).normalized().toRotationMatrix() *
+                  Eigen::Vector3d(at(80), at(84), handedness * at(88)).asDiagonal();
+  map.origin_mm = {at(268), at(272), at(276)};
+  return map;
 }
 
-Affine sform_affine(std::string_view raw, bool swapped) {
-  Affine affine = Affine::Identity();
-  for (Eigen::Index row = 0; row < 3; ++row)
-    for (Eigen::Index column = 0; column < 4; ++column)
-      affine(row, column) = static_cast<double>(
-          load<float>(raw, 280 + 4 * static_cast<std::size_t>(4 * row + column), swapped));
-  return affine;
+CtGrid sform_map(std::string_view raw, bool swapped) {
+  CtGrid map;
+  for (Eigen::Index row = 0; row < 3; ++row) {
+    const auto at = [&](std::size_t column) {
+      const std::size_t number = 4 * static_cast<std::size_t>(row) + column;
+      return static_cast<double>(number_at<float>(raw, 280 + 4 * number, swapped));
+    };
+    map.direction.row(row) << at(0), at(1), at(2);
+    map.origin_mm[row] = at(3);
+  }
+  return map;
 }
 
 /// Along the axis, from the first voxel's centre to the last one's.
 double extent_mm(const ImageHeader& header, std::size_t axis, double spacing_mm) {
-  return static_cast<double>(header.size[axis] - 1) * spacing_mm;
+  return static_cast<double>(header.image.size[axis] - 1) * spacing_mm;
 }
 
 /// The sform's axes must be those of pixdim: a map that is flat, or of other lengths, is no grid.
-void check_lengths(const std::string& path, const ImageHeader& header, const Affine& sform) {
+void check_lengths(const std::string& path, const ImageHeader& header, const CtGrid& sform) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const double length = sform.linear().col(static_cast<Eigen::Index>(axis)).norm();
-    if (!(std::abs(length / header.spacing_mm[axis] - 1.0) <= kMaxDirectionError))
+    const double length = sform.direction.col(static_cast<Eigen::Index>(axis)).norm();
+    if (!(std::abs(length / header.image.spacing_mm[axis] - 1.0) <= kMaxDirectionError))
       throw InputError("sform",
                        "an axis of " + number_text(length) + " mm per voxel",
-                       "must be as long as pixdim says, " + number_text(header.spacing_mm[axis]) +
+                       "must be as long as pixdim says, " +
+                           number_text(header.image.spacing_mm[axis]) +
                            " (a scaled or singular map is not supported; resample the CT)",
                        path);
   }
-}
-
-/// The largest distance, over the corners of the volume, between where two maps place it.
-double largest_difference_mm(const ImageHeader& header, const Affine& a, const Affine& b) {
-  double largest = 0.0;
-  for (unsigned corner = 0; corner < 8; ++corner) {
-    Eigen::Vector3d index;
-    for (unsigned axis = 0; axis < 3; ++axis)
-      index[axis] = (corner >> axis & 1u) != 0 ? static_cast<double>(header.size[axis] - 1) : 0.0;
-    largest = std::max(largest, (a * index - b * index).norm());
-  }
-  return largest;
 }
 
 /// Where a volume lies. Of two maps the sform counts when it leads to the scanner's coordinates
@@ -122,42 +103,45 @@ void place_volume(const std::string& path,
                   std::string_view raw,
                   bool swapped,
                   ImageHeader& header) {
-  const int qform_code = load<std::int16_t>(raw, 252, swapped);
-  const int sform_code = load<std::int16_t>(raw, 254, swapped);
+  const int qform_code = number_at<std::int16_t>(raw, 252, swapped);
+  const int sform_code = number_at<std::int16_t>(raw, 254, swapped);
   header.has_orientation = qform_code > 0 || sform_code > 0;
-  if (!header.has_orientation || header.size.size() < 3) return;
-  const Affine qform = qform_affine(raw, swapped);
-  const Affine sform = sform_affine(raw, swapped);
+  if (!header.has_orientation || header.image.size.size() < 3) return;
+  CtGrid qform = qform_map(raw, swapped);
+  CtGrid sform = sform_map(raw, swapped);
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    qform.size[axis] = sform.size[axis] = static_cast<int>(header.image.size[axis]);
   const bool is_by_sform = sform_code == 1 || qform_code <= 0;
   if (is_by_sform) check_lengths(path, header, sform);
   if (qform_code > 0 && sform_code > 0 &&
-      largest_difference_mm(header, qform, sform) > kMaxPlaceDifferenceMm)
+      largest_corner_shift_mm(qform, sform) > kMaxPlaceDifferenceMm)
     header.warnings.push_back(path + ": sform and qform place the CT differently; the " +
                               (is_by_sform ? "sform" : "qform") + " is used");
-  const Affine& ras = is_by_sform ? sform : qform;
+  const CtGrid& ras = is_by_sform ? sform : qform;
   const Eigen::Vector3d lps_from_ras(-1.0, -1.0, 1.0);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<Eigen::Index>(axis);
-    const Eigen::Vector3d column = lps_from_ras.cwiseProduct(ras.linear().col(i));
+    const Eigen::Vector3d column = lps_from_ras.cwiseProduct(ras.direction.col(i));
     const Eigen::Vector3d unit = column.normalized();
-    header.directions[axis].assign(unit.begin(), unit.end());
-    header.origin_mm[axis] = lps_from_ras[i] * ras.translation()[i] + 0.0;  // no -0
+    header.image.directions[axis].assign(unit.begin(), unit.end());
+    header.image.origin_mm[axis] = lps_from_ras[i] * ras.origin_mm[i] + 0.0;  // no -0
     // pixdim where the two agree to what tells CTs apart: both are rounded to single precision.
-    if (extent_mm(header, axis, std::abs(column.norm() - header.spacing_mm[axis])) > kSamePlaceMm)
-      header.spacing_mm[axis] = column.norm();
+    if (extent_mm(header, axis, std::abs(column.norm() - header.image.spacing_mm[axis])) >
+        kSamePlaceMm)
+      header.image.spacing_mm[axis] = column.norm();
   }
 }
 
 void check_nifti_numbers(const std::string& path, std::string_view raw, bool swapped) {
-  const int units = load<char>(raw, 123, false) & 7;
+  const int units = number_at<char>(raw, 123, false) & 7;
   if (units == 1 || units == 3)
     throw InputError("xyzt_units",
                      units == 1 ? "metres" : "micrometres",
                      "lengths must be in mm (unit code 2)",
                      path);
   for (std::size_t axis = 1; axis <= 3; ++axis) {
-    const float spacing = load<float>(raw, 76 + 4 * axis, swapped);
-    if (axis <= static_cast<std::size_t>(load<std::int16_t>(raw, 40, swapped)) &&
+    const float spacing = number_at<float>(raw, 76 + 4 * axis, swapped);
+    if (axis <= static_cast<std::size_t>(number_at<std::int16_t>(raw, 40, swapped)) &&
         !is_plausible_spacing_mm(static_cast<double>(spacing)))
       throw InputError("pixdim[" + std::to_string(axis) + "]",
                        number_text(static_cast<double>(spacing)),
@@ -166,7 +150,7 @@ void check_nifti_numbers(const std::string& path, std::string_view raw, bool swa
   }
   // Quaternion, offsets, and the rows of the sform.
   for (std::size_t offset = 256; offset < 328; offset += 4) {
-    const float value = std::abs(load<float>(raw, offset, swapped));
+    const float value = std::abs(number_at<float>(raw, offset, swapped));
     if (!(value < kMaxOrientation))
       throw InputError("orientation (header byte " + std::to_string(offset) + ")",
                        number_text(static_cast<double>(value)),
@@ -181,8 +165,8 @@ void read_rescale(const std::string& path,
                   std::string_view raw,
                   bool swapped,
                   ImageHeader& header) {
-  const float slope = load<float>(raw, 112, swapped);
-  const float intercept = load<float>(raw, 116, swapped);
+  const float slope = number_at<float>(raw, 112, swapped);
+  const float intercept = number_at<float>(raw, 116, swapped);
   if (slope == 0.0f || !std::isfinite(slope)) return;
   if (!(std::abs(slope) <= kMaxSlope && std::abs(intercept) <= kMaxSlope) ||
       std::abs(slope) < 1.0f / kMaxSlope)
@@ -203,12 +187,13 @@ ImageHeader read_nifti_header(const fs::path& path) {
   const std::string raw = read_inflated_prefix(path, kNifti1HeaderBytes);
   if (raw.size() < kNifti1HeaderBytes)
     throw FileError(name, "NIfTI header", "348 bytes", std::to_string(raw.size()));
-  const auto header_bytes = load<std::int32_t>(raw, 0, false);
+  const auto header_bytes = number_at<std::int32_t>(raw, 0, false);
   const bool swapped = header_bytes != static_cast<std::int32_t>(kNifti1HeaderBytes);
   if (header_bytes == static_cast<std::int32_t>(kNifti2HeaderBytes) ||
-      load<std::int32_t>(raw, 0, true) == static_cast<std::int32_t>(kNifti2HeaderBytes))
+      number_at<std::int32_t>(raw, 0, true) == static_cast<std::int32_t>(kNifti2HeaderBytes))
     throw FileError(name, "NIfTI-2 is not supported; convert to NIfTI-1 (.nii.gz)");
-  if (swapped && load<std::int32_t>(raw, 0, true) != static_cast<std::int32_t>(kNifti1HeaderBytes))
+  if (swapped &&
+      number_at<std::int32_t>(raw, 0, true) != static_cast<std::int32_t>(kNifti1HeaderBytes))
     throw FileError(name, "sizeof_hdr", "348", std::to_string(header_bytes));
   if (raw.compare(344, 3, "n+1") != 0)
     throw FileError(name, "pairs of .hdr and .img are not supported; convert to .nii.gz");
@@ -217,27 +202,27 @@ ImageHeader read_nifti_header(const fs::path& path) {
   header.format = ImageFormat::Nifti;
   header.data_file = path;
   header.compressed = is_gzip(read_prefix(path, 2));
-  const int dimension = load<std::int16_t>(raw, 40, swapped);
+  const int dimension = number_at<std::int16_t>(raw, 40, swapped);
   if (dimension < 1 || dimension > 7)
     throw FileError(name, "dim[0]", "1 to 7", std::to_string(dimension));
   for (int axis = 1; axis <= dimension; ++axis) {
-    const int extent = load<std::int16_t>(raw, 40 + 2 * static_cast<std::size_t>(axis), swapped);
+    const int extent =
+        number_at<std::int16_t>(raw, 40 + 2 * static_cast<std::size_t>(axis), swapped);
     if (extent < 1)
       throw FileError(
           name, "dim[" + std::to_string(axis) + "]", "at least 1", std::to_string(extent));
-    header.size.push_back(static_cast<std::uint64_t>(extent));
-    header.spacing_mm.push_back(
-        static_cast<double>(load<float>(raw, 76 + 4 * static_cast<std::size_t>(axis), swapped)));
+    header.image.size.push_back(static_cast<std::uint64_t>(extent));
+    header.image.spacing_mm.push_back(static_cast<double>(
+        number_at<float>(raw, 76 + 4 * static_cast<std::size_t>(axis), swapped)));
   }
   set_default_place(header);
-  const NiftiType type = nifti_type(name, load<std::int16_t>(raw, 70, swapped));
+  const NiftiType type = nifti_type(name, number_at<std::int16_t>(raw, 70, swapped));
   header.value_type = type.type;
-  header.channels = static_cast<int>(type.channels);
-  header.value_bytes = value_bytes(type.type) * type.channels;
-  const int bits = load<std::int16_t>(raw, 72, swapped);
-  if (static_cast<std::uint64_t>(bits) != 8 * header.value_bytes)
-    throw FileError(name, "bitpix", std::to_string(8 * header.value_bytes), std::to_string(bits));
-  const float offset = load<float>(raw, 108, swapped);
+  header.image.channels = static_cast<int>(type.channels);
+  const int bits = number_at<std::int16_t>(raw, 72, swapped);
+  if (static_cast<std::uint64_t>(bits) != 8 * header.voxel_bytes())
+    throw FileError(name, "bitpix", std::to_string(8 * header.voxel_bytes()), std::to_string(bits));
+  const float offset = number_at<float>(raw, 108, swapped);
   if (!(offset >= 352.0f && offset <= 1e9f))
     throw FileError(name, "vox_offset", "352 to 1e9", std::to_string(offset));
   header.skip_bytes = static_cast<std::uint64_t>(offset);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <set>
 #include <sstream>
 
 #include "base/error.h"
@@ -13,7 +14,6 @@
 #include "image_files/file_bytes.h"
 #include "image_files/image_formats.h"
 #include "image_files/image_text_header.h"
-#include "image_files/itk_image_io.h"
 
 namespace af::image_formats {
 
@@ -21,85 +21,59 @@ namespace fs = std::filesystem;
 
 namespace {
 
+const std::string* either(const TextHeader& header, const char* a, const char* b) {
+  const std::string* value = header.find(a);
+  return value != nullptr ? value : header.find(b);
+}
+
 TextHeader parse_nrrd_text(const fs::path& path) {
-  const std::string text = read_prefix(path, kMaxTextHeaderBytes);
-  TextHeader header{path.string(), {}, 0};
-  std::size_t at = text.find('\n');
-  if (at == std::string::npos) throw FileError(path.string(), "NRRD header is cut short");
-  for (++at; at < text.size();) {
-    const std::size_t end = std::min(text.find('\n', at), text.size());
-    const std::string line = trimmed(std::string_view(text).substr(at, end - at));
-    at = std::min(end + 1, text.size());
+  const std::string bytes = read_prefix(path, kMaxTextHeaderBytes);
+  std::istringstream text(bytes);
+  TextHeader header{path.string(), {}, bytes.size()};
+  std::string line;
+  std::getline(text, line);  // the mark of the format
+  while (std::getline(text, line)) {
+    line = trimmed(line);
     if (line.empty()) {
-      header.end_offset = at;
+      if (!text.eof()) header.end_offset = static_cast<std::uint64_t>(text.tellg());
       return header;
     }
     const auto separator = line.find(':');
     if (line[0] == '#' || separator == std::string::npos) continue;
     if (line.compare(separator, 2, ":=") == 0) continue;  // a key/value pair, not a field
-    header.add(lower(line.substr(0, separator)),
-               trimmed(std::string_view(line).substr(separator + 1)));
+    header.add(lower(line.substr(0, separator)), trimmed(line.substr(separator + 1)));
   }
   // A detached header may end with its last line.
-  if (text.size() == kMaxTextHeaderBytes ||
-      (header.find("data file") == nullptr && header.find("datafile") == nullptr))
+  if (bytes.size() == kMaxTextHeaderBytes || either(header, "data file", "datafile") == nullptr)
     throw FileError(path.string(), "NRRD header is cut short");
-  header.end_offset = text.size();
   return header;
 }
 
 ValueType nrrd_value_type(const TextHeader& header) {
-  static const std::map<std::string, ValueType> type_of_name = {
-      {"signed char", ValueType::Int8},
-      {"int8", ValueType::Int8},
-      {"int8_t", ValueType::Int8},
-      {"uchar", ValueType::UInt8},
-      {"unsigned char", ValueType::UInt8},
-      {"uint8", ValueType::UInt8},
-      {"uint8_t", ValueType::UInt8},
-      {"short", ValueType::Int16},
-      {"short int", ValueType::Int16},
-      {"signed short", ValueType::Int16},
-      {"signed short int", ValueType::Int16},
-      {"int16", ValueType::Int16},
-      {"int16_t", ValueType::Int16},
-      {"ushort", ValueType::UInt16},
-      {"unsigned short", ValueType::UInt16},
-      {"unsigned short int", ValueType::UInt16},
-      {"uint16", ValueType::UInt16},
-      {"uint16_t", ValueType::UInt16},
-      {"int", ValueType::Int32},
-      {"signed int", ValueType::Int32},
-      {"int32", ValueType::Int32},
-      {"int32_t", ValueType::Int32},
-      {"uint", ValueType::UInt32},
-      {"unsigned int", ValueType::UInt32},
-      {"uint32", ValueType::UInt32},
-      {"uint32_t", ValueType::UInt32},
-      {"longlong", ValueType::Int64},
-      {"long long", ValueType::Int64},
-      {"long long int", ValueType::Int64},
-      {"signed long long", ValueType::Int64},
-      {"signed long long int", ValueType::Int64},
-      {"int64", ValueType::Int64},
-      {"int64_t", ValueType::Int64},
-      {"ulonglong", ValueType::UInt64},
-      {"unsigned long long", ValueType::UInt64},
-      {"unsigned long long int", ValueType::UInt64},
-      {"uint64", ValueType::UInt64},
-      {"uint64_t", ValueType::UInt64},
-      {"float", ValueType::Float32},
-      {"double", ValueType::Float64}};
+  static const std::map<ValueType, std::set<std::string_view>> kNames = {
+      {ValueType::Int8, {"signed char", "int8", "int8_t"}},
+      {ValueType::UInt8, {"uchar", "unsigned char", "uint8", "uint8_t"}},
+      {ValueType::Int16,
+       {"short", "short int", "signed short", "signed short int", "int16", "int16_t"}},
+      {ValueType::UInt16, {"ushort", "unsigned short", "unsigned short int", "uint16", "uint16_t"}},
+      {ValueType::Int32, {"int", "signed int", "int32", "int32_t"}},
+      {ValueType::UInt32, {"uint", "unsigned int", "uint32", "uint32_t"}},
+      {ValueType::Int64,
+       {"longlong",
+        "long long",
+        "long long int",
+        "signed long long",
+        "signed long long int",
+        "int64",
+        "int64_t"}},
+      {ValueType::UInt64,
+       {"ulonglong", "unsigned long long", "unsigned long long int", "uint64", "uint64_t"}},
+      {ValueType::Float32, {"float"}},
+      {ValueType::Float64, {"double"}}};
   const std::string type = lower(header.require("type"));
-  const auto found = type_of_name.find(type);
-  if (found == type_of_name.end())
-    throw FileError(header.path, "type", "a number type of NRRD", "'" + type + "'");
-  return found->second;
-}
-
-const std::string* either(const TextHeader& header, const char* a, const char* b) {
-  const std::string* value = header.find(a);
-  return value != nullptr ? value : header.find(b);
+  for (const auto& [value_type, names] : kNames)
+    if (names.contains(type)) return value_type;
+  throw FileError(header.path, "type", "a number type of NRRD", "'" + type + "'");
 }
 
 /// Whether the voxels are in the other byte order than this machine's.
@@ -173,31 +147,27 @@ std::optional<std::array<double, 3>> lps_signs(const std::string& space) {
 
 /// "spacings"; none where an axis has none ("nan").
 std::vector<double> nrrd_spacings(const TextHeader& header, std::size_t axes) {
-  const std::string* text = header.find("spacings");
-  if (text == nullptr) return {};
-  std::vector<double> spacings;
-  std::istringstream words(*text);
-  for (std::string word; words >> word;) {
-    const std::optional<double> value = parsed_number(word);
-    if (!value) throw FileError(header.path, "spacings", "numbers", "'" + *text + "'");
-    if (std::isnan(*value)) return {};
-    spacings.push_back(*value);
-  }
+  if (header.find("spacings") == nullptr) return {};
+  const std::vector<double> spacings = header.numbers("spacings");
+  if (std::ranges::any_of(spacings, [](double value) { return std::isnan(value); })) return {};
   if (spacings.size() != axes)
-    throw FileError(header.path, "spacings", std::to_string(axes) + " numbers", "'" + *text + "'");
+    throw FileError(header.path,
+                    "spacings",
+                    std::to_string(axes) + " numbers",
+                    "'" + header.require("spacings") + "'");
   return spacings;
 }
 
 /// Where the image lies.
 void read_nrrd_place(const TextHeader& text, ImageHeader& header) {
-  const std::size_t axes = header.size.size();
+  const std::size_t axes = header.image.size.size();
   set_default_place(header);
   const std::vector<std::vector<double>> directions = nrrd_directions(text, axes);
-  header.spacing_mm = nrrd_spacings(text, axes);
-  if (!directions.empty()) header.spacing_mm.clear();
-  for (const auto& vector : directions) header.spacing_mm.push_back(length_of(vector));
-  header.has_spacing = !header.spacing_mm.empty();
-  header.spacing_mm.resize(axes, 1.0);
+  header.image.spacing_mm = nrrd_spacings(text, axes);
+  if (!directions.empty()) header.image.spacing_mm.clear();
+  for (const auto& vector : directions) header.image.spacing_mm.push_back(length_of(vector));
+  header.has_spacing = !header.image.spacing_mm.empty();
+  header.image.spacing_mm.resize(axes, 1.0);
   const std::string* const name = text.find("space");
   const std::string space = name == nullptr ? "" : lower(*name);
   const auto signs = lps_signs(space);
@@ -220,9 +190,10 @@ void read_nrrd_place(const TextHeader& text, ImageHeader& header) {
   if (!is_in_space) return;
   for (std::size_t row = 0; row < 3; ++row) {
     const double sign = signs ? (*signs)[row] : 1.0;
-    header.origin_mm[row] = sign * (*origin)[row];
+    header.image.origin_mm[row] = sign * (*origin)[row];
     for (std::size_t axis = 0; axis < 3; ++axis)
-      header.directions[axis][row] = sign * directions[axis][row] / header.spacing_mm[axis];
+      header.image.directions[axis][row] =
+          sign * directions[axis][row] / header.image.spacing_mm[axis];
   }
 }
 
@@ -232,8 +203,7 @@ void check_nrrd_kinds(const TextHeader& header) {
   if (text == nullptr) return;
   constexpr std::array<std::string_view, 8> kOfVoxels = {
       "domain", "space", "time", "list", "stub", "scalar", "none", "???"};
-  std::istringstream words(*text);
-  for (std::string word; words >> word;)
+  for (const std::string& word : words_of(*text))
     if (std::find(kOfVoxels.begin(), kOfVoxels.end(), lower(word)) == kOfVoxels.end())
       throw InputError(
           "kinds", *text, "one value per voxel is read: \"domain\" for every axis", header.path);
@@ -242,8 +212,7 @@ void check_nrrd_kinds(const TextHeader& header) {
 void check_nrrd_units(const TextHeader& header) {
   const std::string* text = header.find("space units");
   if (text == nullptr) return;
-  std::istringstream words(*text);
-  for (std::string word; words >> word;)
+  for (const std::string& word : words_of(*text))
     if (word != "\"mm\"" && word != "\"\"")
       throw InputError("space units", *text, "lengths must be in \"mm\"", header.path);
 }
@@ -254,10 +223,8 @@ ImageHeader read_nrrd_header(const fs::path& path) {
   const TextHeader text = parse_nrrd_text(path);
   ImageHeader header;
   header.format = ImageFormat::Nrrd;
-  const std::int64_t dimension = checked_dimension(text, "dimension");
-  header.size = parse_sizes(text.path, text.require("sizes"), dimension);
+  header.image.size = sizes_of(text, "dimension", "sizes");
   header.value_type = nrrd_value_type(text);
-  header.value_bytes = value_bytes(header.value_type);
   read_nrrd_place(text, header);
   check_nrrd_units(text);
   check_nrrd_kinds(text);
@@ -268,10 +235,6 @@ ImageHeader read_nrrd_header(const fs::path& path) {
   if (text.integer("line skip", 0) != 0 || text.integer("lineskip", 0) != 0)
     throw FileError(text.path, "'line skip' is not supported");
   const std::string* data_file = either(text, "data file", "datafile");
-  if (data_file != nullptr &&
-      (data_file->starts_with("LIST") || data_file->find('%') != std::string::npos))
-    throw FileError(text.path,
-                    "data file: " + *data_file + ": one file per slice is not supported");
   header.data_file = data_file == nullptr ? path : beside(path, *data_file);
   header.payload_offset = data_file == nullptr ? text.end_offset : 0;
   const std::uint64_t bytes = existing_file_size(path, header.data_file);

@@ -1,14 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <array>
-#include <cerrno>
-#include <cstdint>
+#include <bit>
 #include <fstream>
+#include <new>
+#include <png.h>
 #include <string>
-#include <string_view>
-#include <sys/mman.h>
-#include <system_error>
-#include <unistd.h>
-#include <zlib.h>
 
 #include "base/error.h"
 #include "files/input_file.h"
@@ -20,99 +15,71 @@ namespace fs = std::filesystem;
 
 namespace {
 
-std::uint32_t big_endian(std::string_view bytes) {
-  std::uint32_t value = 0;
-  for (const char byte : bytes) value = value << 8 | static_cast<unsigned char>(byte);
-  return value;
-}
-
-/// Checks IHDR; libpng aborts the process on what it does not like there.
-void check_png_header(const std::string& path, std::string_view data) {
-  constexpr std::uint32_t kMaxPngSide = 1000000;  // libpng's own limit
-  const std::uint32_t width = big_endian(data.substr(0, 4));
-  const std::uint32_t height = big_endian(data.substr(4, 4));
-  if (width < 1 || height < 1 || width > kMaxPngSide || height > kMaxPngSide)
-    throw FileError(path,
-                    "PNG size",
-                    "1 to 1000000 pixels",
-                    std::to_string(width) + " x " + std::to_string(height));
-  const int depth = static_cast<unsigned char>(data[8]);
-  const int color = static_cast<unsigned char>(data[9]);
-  if (color == 2 || color == 3 || color == 4 || color == 6)
-    throw InputError("PNG colour type", std::to_string(color), "must be 0, plain grey", path);
-  if (color != 0 || std::string_view("\1\2\4\10\20").find(data[8]) == std::string_view::npos ||
-      data[10] != 0 || data[11] != 0 || (data[12] & ~1) != 0)
-    throw FileError(
-        path,
-        "PNG header",
-        "grey of 1 to 16 bits",
-        "colour type " + std::to_string(color) + ", " + std::to_string(depth) + " bits");
-}
-
-/// Walks the chunks of a PNG file with their checksums up to its end mark. The file's bytes, but of
-/// its chunks only those of the stored values: others (sBIT, tRNS) make ITK change these.
-std::string plain_png(const fs::path& path) {
-  const std::uint64_t file_bytes = existing_file_size(path, path);
-  std::ifstream file = open_input_file(path);
-  constexpr std::uint64_t kSignatureBytes = 8;
-  std::string plain(kSignatureBytes, '\0');
-  file.read(plain.data(), static_cast<std::streamsize>(plain.size()));
-  std::uint64_t at = kSignatureBytes;
-  for (bool is_first = true;; is_first = false) {
-    std::array<char, 8> head{};
-    file.seekg(static_cast<std::streamoff>(at));
-    file.read(head.data(), head.size());
-    const std::uint64_t length = big_endian({head.data(), 4});
-    const std::string_view type(head.data() + 4, 4);
-    if (!file || at + 12 + length > file_bytes)
-      throw FileError(path.string(), "truncated: a PNG chunk reaches beyond the end of the file");
-    std::string data(length + 4, '\0');
-    file.read(data.data(), static_cast<std::streamsize>(data.size()));
-    uLong crc = crc32(0, reinterpret_cast<const unsigned char*>(type.data()), 4);
-    crc =
-        crc32(crc, reinterpret_cast<const unsigned char*>(data.data()), static_cast<uInt>(length));
-    if (crc != big_endian(std::string_view(data).substr(length)))
-      throw FileError(path.string(),
-                      "corrupt: the checksum of PNG chunk " + std::string(type) + " is wrong");
-    if (is_first && (type != "IHDR" || length != 13))
-      throw FileError(path.string(), "PNG file does not begin with its header");
-    if (is_first) check_png_header(path.string(), data);
-    if (type == "IHDR" || type == "IDAT" || type == "IEND")
-      plain.append(head.data(), head.size()).append(data);
-    if (type == "IEND") return plain;
-    at += 12 + length;
-  }
-}
-
-/// Bytes that a library can open as a file; kept in memory.
-class BytesAsFile {
+/// An open file whose library's complaints are exceptions, which the library permits in place of
+/// its long jumps.
+class PngFile {
  public:
-  BytesAsFile(const std::string& what, std::string_view bytes)
-      : descriptor_(memfd_create("image", MFD_CLOEXEC)) {
-    while (descriptor_ >= 0 && !bytes.empty()) {
-      const ssize_t written = ::write(descriptor_, bytes.data(), bytes.size());
-      if (written <= 0) break;
-      bytes.remove_prefix(static_cast<std::size_t>(written));
+  explicit PngFile(const fs::path& path)
+      : path_(path.string()),
+        file_(open_input_file(path)),
+        png_(png_create_read_struct(
+            PNG_LIBPNG_VER_STRING, this, &fail, [](png_structp, png_const_charp) {})),
+        info_(png_ != nullptr ? png_create_info_struct(png_) : nullptr) {
+    if (info_ == nullptr) {
+      png_destroy_read_struct(&png_, nullptr, nullptr);
+      throw std::bad_alloc();
     }
-    if (descriptor_ >= 0 && bytes.empty()) return;
-    const std::string trouble = std::generic_category().message(errno);
-    if (descriptor_ >= 0) ::close(descriptor_);
-    throw FileError(what, "cannot be held in memory: " + trouble);
+    png_set_read_fn(png_, &file_, &read);
   }
-  ~BytesAsFile() { ::close(descriptor_); }
-  BytesAsFile(const BytesAsFile&) = delete;
-  BytesAsFile& operator=(const BytesAsFile&) = delete;
-  [[nodiscard]] fs::path path() const { return "/proc/self/fd/" + std::to_string(descriptor_); }
+  ~PngFile() { png_destroy_read_struct(&png_, &info_, nullptr); }
+  PngFile(const PngFile&) = delete;
+  PngFile& operator=(const PngFile&) = delete;
+
+  [[nodiscard]] png_structp png() const { return png_; }
+  [[nodiscard]] png_infop info() const { return info_; }
 
  private:
-  int descriptor_;
+  [[noreturn]] static void fail(png_structp png, png_const_charp complaint) {
+    throw FileError(static_cast<PngFile*>(png_get_error_ptr(png))->path_,
+                    std::string("not a readable PNG image, or truncated: ") + complaint);
+  }
+
+  static void read(png_structp png, png_bytep bytes, std::size_t count) {
+    auto& file = *static_cast<std::ifstream*>(png_get_io_ptr(png));
+    if (!file.read(reinterpret_cast<char*>(bytes), static_cast<std::streamsize>(count)))
+      png_error(png, "the file ends within a chunk");
+  }
+
+  std::string path_;
+  std::ifstream file_;
+  png_structp png_;
+  png_infop info_;
 };
 
 }  // namespace
 
 RawImage read_png(const fs::path& path, const AcceptImage& accept) {
-  const BytesAsFile plain(path.string(), plain_png(path));
-  return read_raw_image(plain.path(), ImageFormat::Png, accept);
+  const PngFile file(path);
+  const png_structp png = file.png();
+  png_read_info(png, file.info());
+  if (const int color = png_get_color_type(png, file.info()); color != PNG_COLOR_TYPE_GRAY)
+    throw InputError(
+        "PNG colour type", std::to_string(color), "must be 0, plain grey", path.string());
+  RawImage image;
+  image.size = {png_get_image_width(png, file.info()), png_get_image_height(png, file.info())};
+  image.spacing_mm = {1.0, 1.0};
+  image.type = png_get_bit_depth(png, file.info()) > 8 ? ValueType::UInt16 : ValueType::UInt8;
+  accept(image);
+  png_set_packing(png);  // of 1, 2 and 4 bits
+  if (std::endian::native == std::endian::little) png_set_swap(png);
+  image.values.resize(image.voxel_count() * value_bytes(image.type));
+  std::vector<png_bytep> rows;
+  for (std::size_t row = 0; row < image.size[1]; ++row)
+    rows.push_back(reinterpret_cast<png_bytep>(image.values.data()) +
+                   row * image.size[0] * value_bytes(image.type));
+  png_read_image(png, rows.data());
+  png_read_end(png, nullptr);
+  return image;
 }
 
 }  // namespace af::image_formats

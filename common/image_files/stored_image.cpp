@@ -2,11 +2,17 @@
 #include "image_files/stored_image.h"
 
 #include <algorithm>
+#include <array>
 #include <span>
 #include <utility>
 
 #include "base/error.h"
+#include "files/captured_output.h"
+#include "files/input_guard.h"
+#include "files/output_file.h"
+#include "image_files/file_bytes.h"
 #include "image_files/image_formats.h"
+#include "image_files/itk_image_io.h"
 
 namespace af {
 
@@ -18,41 +24,16 @@ using namespace image_formats;
 
 /// Deflate cannot expand a byte to more than this many.
 constexpr std::uint64_t kMaxDeflateRatio = 1040;
+constexpr std::uint64_t kPieceBytes = std::uint64_t{1} << 20;
 
-/// Cuts a stream of bytes into pieces of kPieceBytes, without what stands before and after the
-/// voxels.
-class PayloadPieces {
- public:
-  PayloadPieces(std::uint64_t skipped_bytes, std::uint64_t payload_bytes, ByteVisitor visit)
-      : to_skip_(skipped_bytes), to_come_(payload_bytes), visit_(std::move(visit)) {}
-
-  void add(std::span<const std::byte> bytes) {
-    const auto skipped = std::min<std::uint64_t>(to_skip_, bytes.size());
-    to_skip_ -= skipped;
-    bytes = bytes.subspan(skipped);
-    bytes = bytes.first(std::min<std::uint64_t>(to_come_, bytes.size()));
-    to_come_ -= bytes.size();
-    while (!bytes.empty()) {
-      const std::size_t taken = std::min(bytes.size(), kPieceBytes - piece_.size());
-      piece_.insert(
-          piece_.end(), bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(taken));
-      bytes = bytes.subspan(taken);
-      if (piece_.size() == kPieceBytes) flush();
-    }
-    if (to_come_ == 0) flush();
-  }
-
- private:
-  void flush() {
-    if (!piece_.empty()) visit_(piece_);
-    piece_.clear();
-  }
-
-  std::uint64_t to_skip_;
-  std::uint64_t to_come_;
-  ByteVisitor visit_;
-  std::vector<std::byte> piece_;
-};
+[[noreturn]] void fail_short(const ImageHeader& header,
+                             std::uint64_t expected,
+                             std::uint64_t found) {
+  throw FileError(header.data_file.string(),
+                  "truncated: voxel data",
+                  std::to_string(expected) + " bytes",
+                  std::to_string(found));
+}
 
 /// A stream of another length than stated is another stream, or was cut and mended. What stands
 /// behind it is said, not read.
@@ -93,6 +74,46 @@ std::vector<std::byte> rescaled_to(const ImageHeader& header, std::span<const st
   return {raw.begin(), raw.end()};
 }
 
+struct WritableFormat {
+  std::string_view extension;
+  ImageFormat format;
+};
+constexpr std::array<WritableFormat, 7> kWritable = {{{".nii.gz", ImageFormat::Nifti},
+                                                      {".nii", ImageFormat::Nifti},
+                                                      {".mha", ImageFormat::MetaImage},
+                                                      {".nrrd", ImageFormat::Nrrd},
+                                                      {".tif", ImageFormat::Tiff},
+                                                      {".tiff", ImageFormat::Tiff},
+                                                      {".png", ImageFormat::Png}}};
+
+WritableFormat writable_format(const fs::path& path) {
+  const std::string name = path.filename().string();
+  for (const WritableFormat& known : kWritable)
+    if (name.size() > known.extension.size() && name.ends_with(known.extension)) return known;
+  throw UsageError(path.string() +
+                   ": unknown image extension; known: .mha .nii.gz .nii .nrrd .tif .tiff .png");
+}
+
+/// ITK does not notice a full disk: it leaves a shorter file and says nothing.
+void check_is_whole(const RawImage& image, const fs::path& file, ImageFormat format) {
+  bool is_whole = false;
+  try {
+    const ImageHeader header = read_image_header(file, format);
+    const RawImage found = read_stored_image(file, header, nullptr, [](const RawImage&) {});
+    is_whole = found.type == image.type && found.values == image.values;
+  } catch (const FileError&) {
+  }
+  if (is_whole) return;
+  std::error_code error;
+  const fs::space_info space =
+      fs::space(file.parent_path().empty() ? "." : file.parent_path(), error);
+  throw FileError(file.string(),
+                  "cannot be written whole: other voxels are read back" +
+                      (error ? std::string()
+                             : " (" + std::to_string(space.available) +
+                                   " bytes are left on its disk; ulimit -f may set a limit, too)"));
+}
+
 }  // namespace
 
 void read_image_payload(const fs::path& path,
@@ -108,42 +129,29 @@ void read_image_payload(const fs::path& path,
     throw FileError(path.string(),
                     "truncated: " + std::to_string(stored) + " compressed bytes cannot hold the " +
                         std::to_string(expected) + " bytes that the header promises");
-  PayloadPieces pieces(header.skip_bytes, payload, visit);
-  const ByteVisitor take = [&](std::span<const std::byte> bytes) { pieces.add(bytes); };
-  std::uint64_t found = stored;
-  if (header.compressed) {
-    const InflatedBytes bytes = inflate_file(header.data_file, header.payload_offset, take);
-    check_compressed_bytes(path, header, bytes.compressed, stored, warnings);
-    found = bytes.inflated;
-  } else if (stored >= expected) {
-    found = read_plain_file(header.data_file, header.payload_offset, take);
-  }
-  if (found < expected)
-    throw FileError(header.data_file.string(),
-                    "truncated: voxel data",
-                    std::to_string(expected) + " bytes",
-                    std::to_string(found));
-  if (found > expected && warnings != nullptr)
-    warnings->push_back(header.data_file.string() + ": " + std::to_string(found - expected) +
+  if (!header.compressed && stored < expected) fail_short(header, expected, stored);
+  ByteSource source(header.data_file, header.payload_offset, header.compressed);
+  std::uint64_t found = 0;
+  std::vector<std::byte> piece(kPieceBytes);
+  for (std::uint64_t end : {header.skip_bytes, expected})
+    while (found < end) {
+      const std::span<std::byte> next =
+          std::span(piece).first(std::min<std::uint64_t>(kPieceBytes, end - found));
+      const std::size_t taken = source.read(next);
+      found += taken;
+      if (taken < next.size()) fail_short(header, expected, found);
+      if (end == expected) visit(next);
+    }
+  const std::uint64_t surplus = source.drain();
+  if (header.compressed)
+    check_compressed_bytes(path, header, source.compressed_bytes(), stored, warnings);
+  if (surplus > 0 && warnings != nullptr)
+    warnings->push_back(header.data_file.string() + ": " + std::to_string(surplus) +
                         " bytes more than the header says; they are ignored");
-}
-
-RawImage image_description(const ImageHeader& header) {
-  RawImage image;
-  image.size.assign(header.size.begin(), header.size.end());
-  image.spacing_mm = header.spacing_mm;
-  image.origin_mm = header.origin_mm;
-  image.directions = header.directions;
-  image.channels = header.channels;
-  image.type = header.value_type;
-  if (header.is_rescaled)
-    image.type = header.value_type == ValueType::Float64 ? ValueType::Float64 : ValueType::Float32;
-  return image;
 }
 
 void read_described_values(const fs::path& path,
                            const ImageHeader& header,
-                           const RawImage& description,
                            std::vector<std::string>* warnings,
                            const ByteVisitor& visit) {
   const std::size_t stored_bytes = value_bytes(header.value_type);
@@ -156,7 +164,7 @@ void read_described_values(const fs::path& path,
     }
     if (!header.is_rescaled)
       visit(piece);
-    else if (description.type == ValueType::Float64)
+    else if (header.image.type == ValueType::Float64)
       visit(rescaled_to<double>(header, piece));
     else
       visit(rescaled_to<float>(header, piece));
@@ -169,15 +177,32 @@ RawImage read_stored_image(const fs::path& path,
                            const AcceptImage& accept) {
   if (header.format == ImageFormat::Tiff) return read_tiff(path, accept);
   if (header.format == ImageFormat::Png) return read_png(path, accept);
-  RawImage image = image_description(header);
+  RawImage image = header.image;
   accept(image);
-  read_described_values(path, header, image, warnings, [&](std::span<const std::byte> piece) {
+  read_described_values(path, header, warnings, [&](std::span<const std::byte> piece) {
     if (image.values.empty())
       image.values.reserve(image.voxel_count() * static_cast<std::size_t>(image.channels) *
                            value_bytes(image.type));
     image.values.insert(image.values.end(), piece.begin(), piece.end());
   });
   return image;
+}
+
+void write_raw_image(const RawImage& image, const fs::path& path) {
+  const WritableFormat target = writable_format(path);
+  if (target.format == ImageFormat::Png) {
+    // ITK crashes when a PNG file cannot be written.
+    write_text_file(path, captured_output(path.string(), [&](int descriptor) {
+                      write_by_itk(
+                          image, "/proc/self/fd/" + std::to_string(descriptor), target.format);
+                    }));
+    return;
+  }
+  write_atomically(path, [&](const fs::path& partial) {
+    write_by_itk(image, partial, target.format);
+    note_written(partial);
+    check_is_whole(image, partial, target.format);
+  });
 }
 
 }  // namespace af

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <array>
 #include <cstdarg>
 #include <cstring>
@@ -88,51 +89,35 @@ struct Page {
 
   /// Where a stored value stands in the upright image.
   [[nodiscard]] std::size_t place(std::size_t column, std::size_t row) const {
-    switch (orientation) {
-      case ORIENTATION_TOPRIGHT:
-      case ORIENTATION_BOTRIGHT:
-      case ORIENTATION_RIGHTBOT:
-      case ORIENTATION_LEFTBOT:
-        column = columns - 1 - column;
-        break;
-      default:
-        break;
-    }
-    switch (orientation) {
-      case ORIENTATION_BOTRIGHT:
-      case ORIENTATION_BOTLEFT:
-      case ORIENTATION_RIGHTTOP:
-      case ORIENTATION_RIGHTBOT:
-        row = rows - 1 - row;
-        break;
-      default:
-        break;
-    }
+    const auto is_one_of = [&](const std::array<int, 4>& turns) {
+      return std::ranges::find(turns, orientation) != turns.end();
+    };
+    if (is_one_of({ORIENTATION_TOPRIGHT,
+                   ORIENTATION_BOTRIGHT,
+                   ORIENTATION_RIGHTBOT,
+                   ORIENTATION_LEFTBOT}))
+      column = columns - 1 - column;
+    if (is_one_of({ORIENTATION_BOTRIGHT,
+                   ORIENTATION_BOTLEFT,
+                   ORIENTATION_RIGHTTOP,
+                   ORIENTATION_RIGHTBOT}))
+      row = rows - 1 - row;
     return is_turned() ? column * rows + row : row * columns + column;
   }
 };
 
 std::optional<ValueType> value_type_of(int format, int bits) {
-  switch (format) {
-    case SAMPLEFORMAT_UINT:
-    case SAMPLEFORMAT_VOID:
-      if (bits >= 1 && bits <= 16) return bits <= 8 ? ValueType::UInt8 : ValueType::UInt16;
-      if (bits == 32) return ValueType::UInt32;
-      if (bits == 64) return ValueType::UInt64;
-      break;
-    case SAMPLEFORMAT_INT:
-      if (bits == 8) return ValueType::Int8;
-      if (bits == 16) return ValueType::Int16;
-      if (bits == 32) return ValueType::Int32;
-      if (bits == 64) return ValueType::Int64;
-      break;
-    case SAMPLEFORMAT_IEEEFP:
-      if (bits == 32) return ValueType::Float32;
-      if (bits == 64) return ValueType::Float64;
-      break;
-    default:
-      break;
-  }
+  const bool is_unsigned = format == SAMPLEFORMAT_UINT || format == SAMPLEFORMAT_VOID;
+  if (is_unsigned && bits >= 1 && bits <= 16)
+    return bits <= 8 ? ValueType::UInt8 : ValueType::UInt16;
+  if (is_unsigned && bits == 32) return ValueType::UInt32;
+  if (is_unsigned && bits == 64) return ValueType::UInt64;
+  if (format == SAMPLEFORMAT_INT && bits == 8) return ValueType::Int8;
+  if (format == SAMPLEFORMAT_INT && bits == 16) return ValueType::Int16;
+  if (format == SAMPLEFORMAT_INT && bits == 32) return ValueType::Int32;
+  if (format == SAMPLEFORMAT_INT && bits == 64) return ValueType::Int64;
+  if (format == SAMPLEFORMAT_IEEEFP && bits == 32) return ValueType::Float32;
+  if (format == SAMPLEFORMAT_IEEEFP && bits == 64) return ValueType::Float64;
   return std::nullopt;
 }
 
@@ -216,40 +201,27 @@ std::size_t checked_block_bytes(const TiffFile& file, tmsize_t bytes) {
   return static_cast<std::size_t>(bytes);
 }
 
-void read_strips(const TiffFile& file, const Page& page, std::byte* values) {
+/// Strips are as wide as the page, and the last one is shorter; tiles are whole.
+void read_blocks(const TiffFile& file, const Page& page, std::byte* values) {
   TIFF* const tiff = file.get();
+  const bool is_tiled = TIFFIsTiled(tiff) != 0;
+  const std::size_t width = is_tiled ? file.number(TIFFTAG_TILEWIDTH) : page.columns;
   Block block;
-  block.columns = page.columns;
-  block.row_bytes = checked_block_bytes(file, TIFFScanlineSize(tiff));
-  block.bytes.resize(checked_block_bytes(file, TIFFStripSize(tiff)));
-  const std::size_t most_rows = block.bytes.size() / block.row_bytes;
-  if (most_rows == 0) file.fail("a strip is shorter than a row");
-  std::uint32_t strip = 0;
-  for (block.row = 0; block.row < page.rows; block.row += most_rows, ++strip) {
-    block.rows = std::min(most_rows, page.rows - block.row);
-    const auto wanted = static_cast<tmsize_t>(block.rows * block.row_bytes);
-    if (TIFFReadEncodedStrip(tiff, strip, block.bytes.data(), wanted) != wanted)
-      file.fail("strip " + std::to_string(strip) + " is not whole");
-    store(page, block, values);
-  }
-}
-
-void read_tiles(const TiffFile& file, const Page& page, std::byte* values) {
-  TIFF* const tiff = file.get();
-  const std::size_t width = file.number(TIFFTAG_TILEWIDTH);
-  const std::size_t height = file.number(TIFFTAG_TILELENGTH);
-  Block block;
-  block.row_bytes = checked_block_bytes(file, TIFFTileRowSize(tiff));
-  block.bytes.resize(checked_block_bytes(file, TIFFTileSize(tiff)));
-  if (block.bytes.size() != height * block.row_bytes) file.fail("a tile has no size");
-  std::uint32_t tile = 0;
+  block.row_bytes =
+      checked_block_bytes(file, is_tiled ? TIFFTileRowSize(tiff) : TIFFScanlineSize(tiff));
+  block.bytes.resize(
+      checked_block_bytes(file, is_tiled ? TIFFTileSize(tiff) : TIFFStripSize(tiff)));
+  const std::size_t height = block.bytes.size() / block.row_bytes;
+  if (width == 0 || height == 0) file.fail("a strip is shorter than a row, or a tile has no size");
+  std::uint32_t number = 0;
   for (block.row = 0; block.row < page.rows; block.row += height)
-    for (block.column = 0; block.column < page.columns; block.column += width, ++tile) {
-      const auto wanted = static_cast<tmsize_t>(block.bytes.size());
-      if (TIFFReadEncodedTile(tiff, tile, block.bytes.data(), wanted) != wanted)
-        file.fail("tile " + std::to_string(tile) + " is not whole");
+    for (block.column = 0; block.column < page.columns; block.column += width, ++number) {
       block.rows = std::min(height, page.rows - block.row);
       block.columns = std::min(width, page.columns - block.column);
+      const auto wanted = static_cast<tmsize_t>((is_tiled ? height : block.rows) * block.row_bytes);
+      const auto read = is_tiled ? &TIFFReadEncodedTile : &TIFFReadEncodedStrip;
+      if (read(tiff, number, block.bytes.data(), wanted) != wanted)
+        file.fail((is_tiled ? "tile " : "strip ") + std::to_string(number) + " is not whole");
       store(page, block, values);
     }
 }
@@ -293,11 +265,7 @@ RawImage read_tiff(const fs::path& path, const AcceptImage& accept) {
     const Page page = turn_to(file, pages[i]);
     if (page.width() != first.width() || page.height() != first.height() || page.type != first.type)
       file.refuse("page", std::to_string(i + 1), "must have the size and the numbers of the first");
-    std::byte* const values = image.values.data() + i * page_bytes;
-    if (TIFFIsTiled(file.get()) != 0)
-      read_tiles(file, page, values);
-    else
-      read_strips(file, page, values);
+    read_blocks(file, page, image.values.data() + i * page_bytes);
   }
   return image;
 }

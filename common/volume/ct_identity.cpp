@@ -22,6 +22,17 @@ std::array<Eigen::Vector3d, 8> corners_mm(const CtGrid& grid) {
   return corners;
 }
 
+/// The corner that lies farthest off.
+std::size_t farthest_corner(const CtGrid& a, const CtGrid& b) {
+  const auto wanted = corners_mm(a);
+  const auto found = corners_mm(b);
+  std::size_t farthest = 0;
+  for (std::size_t i = 0; i < wanted.size(); ++i)
+    if (!((found[i] - wanted[i]).norm() <= (found[farthest] - wanted[farthest]).norm()))
+      farthest = i;
+  return farthest;
+}
+
 std::string size_text(const CtGrid& grid) {
   return std::to_string(grid.size[0]) + " x " + std::to_string(grid.size[1]) + " x " +
          std::to_string(grid.size[2]) + " voxels";
@@ -41,6 +52,11 @@ bool is_same_place(const Eigen::Vector3d& a_mm, const Eigen::Vector3d& b_mm) {
   return (a_mm - b_mm).norm() <= kSamePlaceMm;
 }
 
+double largest_corner_shift_mm(const CtGrid& a, const CtGrid& b) {
+  const std::size_t corner = farthest_corner(a, b);
+  return (corners_mm(a)[corner] - corners_mm(b)[corner]).norm();
+}
+
 std::string text(const CtIdentity& ct) {
   const auto corners = corners_mm(ct.grid);
   return ct.content_sha256 + ", " + size_text(ct.grid) + " from " + place_text(corners.front()) +
@@ -53,17 +69,14 @@ std::string ct_difference(const CtIdentity& expected, const CtIdentity& found) {
            expected.content_sha256;
   if (found.grid.size != expected.grid.size)
     return "it has " + size_text(found.grid) + " instead of " + size_text(expected.grid);
-  const auto wanted = corners_mm(expected.grid);
-  const auto corners = corners_mm(found.grid);
-  std::size_t farthest = 0;
-  for (std::size_t i = 0; i < wanted.size(); ++i)
-    if (!((corners[i] - wanted[i]).norm() <= (corners[farthest] - wanted[farthest]).norm()))
-      farthest = i;
-  if (is_same_place(corners[farthest], wanted[farthest])) return "";
+  const std::size_t corner = farthest_corner(expected.grid, found.grid);
+  const Eigen::Vector3d wanted = corners_mm(expected.grid)[corner];
+  const Eigen::Vector3d place = corners_mm(found.grid)[corner];
+  if (is_same_place(place, wanted)) return "";
   std::ostringstream text;
-  text << "its voxels are the same, but they lie elsewhere: a corner at "
-       << place_text(corners[farthest]) << " instead of " << place_text(wanted[farthest]) << ", "
-       << std::setprecision(4) << (corners[farthest] - wanted[farthest]).norm() << " mm off";
+  text << "its voxels are the same, but they lie elsewhere: a corner at " << place_text(place)
+       << " instead of " << place_text(wanted) << ", " << std::setprecision(4)
+       << (place - wanted).norm() << " mm off";
   return text.str();
 }
 

@@ -24,6 +24,9 @@ inline constexpr double kSamePlaceMm = 1e-3;
 
 bool is_same_place(const Eigen::Vector3d& a_mm, const Eigen::Vector3d& b_mm);
 
+/// The largest distance between the places that two grids of one size give to a corner's voxel.
+double largest_corner_shift_mm(const CtGrid& a, const CtGrid& b);
+
 /// The hash, and the places of the first and the last voxel.
 std::string text(const CtIdentity& ct);
 

@@ -16,7 +16,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   std::optional<ImageHeader> header;
   std::vector<std::string> warnings;
   if (!fuzz::is_accepted([&] { header = read_image_header(path, *format); })) return 0;
-  if (header->size.empty()) {  // PNG and TIFF
+  if (header->image.size.empty()) {  // PNG and TIFF
     constexpr std::size_t kMostPixels = std::size_t{1} << 20;
     (void)fuzz::is_accepted([&] {
       (void)read_stored_image(path, *header, nullptr, [&](const RawImage& image) {
@@ -35,8 +35,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         path, *header, &warnings, [&](std::span<const std::byte> piece) { seen += piece.size(); });
   });
   if (!is_whole) return 0;
-  std::uint64_t promised = header->value_bytes;
-  for (const std::uint64_t extent : header->size) promised *= extent;
+  std::uint64_t promised = header->voxel_bytes();
+  for (const std::size_t extent : header->image.size) promised *= extent;
   fuzz::require(seen == promised, "an accepted image has all voxels that its header promises");
   return 0;
 }

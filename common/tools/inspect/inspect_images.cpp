@@ -12,7 +12,6 @@
 #include "image_files/dicom_xray.h"
 #include "image_files/image_file.h"
 #include "image_files/image_header.h"
-#include "image_files/itk_image_io.h"
 #include "image_files/stored_image.h"
 #include "run/input_identity.h"
 #include "study/target_place.h"
@@ -188,12 +187,6 @@ void inspect_stack(const RawImage& image, Inspection& inspection) {
   add_value_facts(std::move(values), inspection);
 }
 
-std::size_t used_dimensions(const RawImage& image) {
-  std::size_t used = image.size.size();
-  while (used > 2 && image.size[used - 1] == 1) --used;
-  return used;
-}
-
 void inspect_picture(const Image2d& image, Inspection& inspection) {
   inspection.kind = "X-ray or DRR image";
   inspection.facts["columns_rows"] = {image.width, image.height};
@@ -243,21 +236,22 @@ void inspect_image(const fs::path& path, const CtReadOptions& options, Inspectio
   inspection.kind = "image";
   const ImageHeader header = read_image_header(path, *format);
   // Volumes whose values cannot be floats are read once, as CTs.
-  const auto long_axes = std::count_if(
-      header.size.begin(), header.size.end(), [](std::uint64_t extent) { return extent > 1; });
-  if (long_axes > 2 && header.value_bytes != sizeof(float))
+  const auto long_axes = std::count_if(header.image.size.begin(),
+                                       header.image.size.end(),
+                                       [](std::size_t extent) { return extent > 1; });
+  if (long_axes > 2 && header.voxel_bytes() != sizeof(float))
     return inspect_ct(path, options, inspection);
   bool is_volume = false;
   const RawImage image = read_stored_image(path, header, nullptr, [&](const RawImage& seen) {
-    is_volume = used_dimensions(seen) > 2;
+    is_volume = seen.used_axes(2) > 2;
     if (seen.voxel_count() > kMaxPixels * (is_volume ? 16 : 1))
       throw InputError("size", std::to_string(seen.voxel_count()) + " voxels", "is too large");
   });
   if (!is_volume) {
     inspect_picture(read_image(path), inspection);
-    if (header.has_spacing && !header.size.empty())
+    if (header.has_spacing && !header.image.size.empty())
       inspection.facts["pixel_spacing_mm"] = {image.spacing_mm[0], image.spacing_mm[1]};
-  } else if (image.channels == 1 && used_dimensions(image) == 3 &&
+  } else if (image.channels == 1 && image.used_axes(2) == 3 &&
              (*format == ImageFormat::Tiff || holds_line_integrals(image))) {
     inspect_stack(image, inspection);
   } else {

@@ -21,7 +21,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
-#include "image_files/itk_image_io.h"
+#include "image_files/stored_image.h"
 #include "support/io_checks.h"
 #include "support/test_paths.h"
 #include "unit/image_files/ct_test_data.h"
@@ -38,18 +38,6 @@ using testing::HasSubstr;
 
 void expect_same_ct(const CtVolume& expected, const CtVolume& found) {
   EXPECT_EQ(ct_difference(identity_of(expected), identity_of(found)), "");
-}
-
-/// Between the same corners of two grids of one size.
-double largest_corner_shift_mm(const CtGrid& a, const CtGrid& b) {
-  double largest = 0.0;
-  for (unsigned corner = 0; corner < 8; ++corner) {
-    Eigen::Vector3d index = Eigen::Vector3d::Zero();
-    for (unsigned axis = 0; axis < 3; ++axis)
-      if ((corner >> axis & 1u) != 0) index[axis] = a.size[axis] - 1.0;
-    largest = std::max(largest, (a.point_mm(index) - b.point_mm(index)).norm());
-  }
-  return largest;
 }
 
 CtGrid grid_with_direction(const Eigen::Matrix3d& direction) {
@@ -937,6 +925,12 @@ std::vector<BadCt> bad_cts() {
        dicom_text({0x0020, 0x0037}, "DS", "1\\0\\0\\1\\0\\0"),
        kInput,
        "orthogonal unit vectors"},
+      {"DicomOtherFrameOfReference",
+       dicom([](int slice, test::DicomTestFile& file) {
+         file.set_text({0x0020, 0x0052}, "UI", slice == 3 ? "1.2.4" : "1.2.3");
+       }),
+       kInput,
+       "FrameOfReferenceUID = '1.2."},
       {"DicomOtherSpacing",
        dicom_text({0x0028, 0x0030}, "DS", "0.9\\0.7"),
        kInput,

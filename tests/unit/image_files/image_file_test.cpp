@@ -386,27 +386,47 @@ TEST_F(TiffImage, DamagedCopiesAreReadOrRefused) {
   EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
 }
 
+/// A type of four letters and data, with their length and checksum.
+std::string png_chunk(const std::string& typed) {
+  const auto crc =
+      crc32(0, reinterpret_cast<const Bytef*>(typed.data()), static_cast<uInt>(typed.size()));
+  std::string bytes = std::string(3, '\0') + static_cast<char>(typed.size() - 4) + typed;
+  for (int shift = 24; shift >= 0; shift -= 8) bytes += static_cast<char>(crc >> shift & 0xff);
+  return bytes;
+}
+
 TEST(ImageFile, APngHoldsItsStoredValuesWhateverElseItSaysOfThem) {
   const ScratchFolder folder;
   Image2d image(2, 2);
   image.pixels = {0.0f, 4095.0f, 65535.0f, 1234.0f};
   write_image_u16(image, folder / "xray.png", 0.4, 0.4);
   const std::string plain = read_bytes(folder / "xray.png");
-  const auto chunk = [](const std::string& typed) {
-    const auto crc =
-        crc32(0, reinterpret_cast<const Bytef*>(typed.data()), static_cast<uInt>(typed.size()));
-    std::string bytes = std::string(3, '\0') + static_cast<char>(typed.size() - 4) + typed;
-    for (int shift = 24; shift >= 0; shift -= 8) bytes += static_cast<char>(crc >> shift & 0xff);
-    return bytes;
-  };
   using namespace std::string_literals;
   constexpr std::size_t kBehindHeader = 33;
   for (const std::string& said : {"sBIT\x0c"s, "tRNS\x0f\xff"s, "gAMA\0\0\xb1\x8f"s}) {
     SCOPED_TRACE(said.substr(0, 4));
     std::string bytes = plain;
-    test::write_input(folder / "xray.png", bytes.insert(kBehindHeader, chunk(said)));
+    test::write_input(folder / "xray.png", bytes.insert(kBehindHeader, png_chunk(said)));
     EXPECT_EQ(read_image(folder / "xray.png").pixels, image.pixels);
   }
+}
+
+// 3 x 2 pixels 1 2 3 / 0 1 2 in two bits, which a library may stretch to 0 ... 255.
+TEST(ImageFile, APngOfAFewBitsHoldsItsStoredValues) {
+  const ScratchFolder folder;
+  using namespace std::string_literals;
+  const std::string rows = "\0\x6c\0\x18"s;  // each behind its filter's number
+  std::string packed(compressBound(rows.size()), '\0');
+  uLongf size = packed.size();
+  compress(reinterpret_cast<Bytef*>(packed.data()),
+           &size,
+           reinterpret_cast<const Bytef*>(rows.data()),
+           rows.size());
+  packed.resize(size);
+  test::write_input(folder / "xray.png",
+                    "\x89PNG\r\n\x1a\n" + png_chunk("IHDR\0\0\0\3\0\0\0\2\2\0\0\0\0"s) +
+                        png_chunk("IDAT" + packed) + png_chunk("IEND"));
+  EXPECT_THAT(read_image(folder / "xray.png").pixels, testing::ElementsAre(1, 2, 3, 0, 1, 2));
 }
 
 TEST(ImageFile, ADicomFileMayBeginAsATiffDoes) {

@@ -10,7 +10,6 @@
 #include "files/output_file.h"
 #include "image_files/image_file.h"
 #include "image_files/image_header.h"
-#include "image_files/itk_image_io.h"
 #include "pose_files/pose_file.h"
 #include "support/test_paths.h"
 #include "unit/register/method/registration_cases.h"
@@ -65,12 +64,13 @@ TEST(SlicerFiles, PutImagesOnTheirDetectorsInTheRoom) {
     constexpr double kWrittenDigitsMm = 1e-9;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const auto row = static_cast<Eigen::Index>(axis);
-      EXPECT_NEAR(header.origin_mm[axis], camera.detector_origin_point[row], kWrittenDigitsMm);
-      EXPECT_NEAR(header.directions[0][axis], camera.column_direction[row], kWrittenDigitsMm);
-      EXPECT_NEAR(header.directions[1][axis], camera.row_direction[row], kWrittenDigitsMm);
-      EXPECT_NEAR(header.directions[2][axis], camera.beam_direction()[row], kWrittenDigitsMm);
+      EXPECT_NEAR(
+          header.image.origin_mm[axis], camera.detector_origin_point[row], kWrittenDigitsMm);
+      EXPECT_NEAR(header.image.directions[0][axis], camera.column_direction[row], kWrittenDigitsMm);
+      EXPECT_NEAR(header.image.directions[1][axis], camera.row_direction[row], kWrittenDigitsMm);
+      EXPECT_NEAR(header.image.directions[2][axis], camera.beam_direction()[row], kWrittenDigitsMm);
     }
-    EXPECT_NEAR(header.spacing_mm[0], camera.pixel_spacing_mm.x(), kWrittenDigitsMm);
+    EXPECT_NEAR(header.image.spacing_mm[0], camera.pixel_spacing_mm.x(), kWrittenDigitsMm);
   }
 }
 
