@@ -6,7 +6,9 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <gdcmWriter.h>
 #include <span>
+#include <sstream>
 
 #include "base/error.h"
 #include "base/number_text.h"
@@ -19,51 +21,18 @@ namespace {
 
 constexpr double kDegreesPerRadian = 180.0 / M_PI;
 constexpr const char* kXaStorage = "1.2.840.10008.5.1.4.1.1.12.1";
-constexpr const char* kExplicitLittleEndian = "1.2.840.10008.1.2.1";
 
-void append_number(std::string& bytes, std::uint64_t value, int count) {
-  for (int i = 0; i < count; ++i) bytes += static_cast<char>(value >> (8 * i) & 0xff);
+std::string two_bytes(int value) {
+  return {static_cast<char>(value & 0xff), static_cast<char>(value >> 8 & 0xff)};
 }
 
-/// Elements in the order of their tags.
-class ElementWriter {
- public:
-  void text(std::uint16_t group, std::uint16_t element, const char* form, std::string value) {
-    if (value.size() % 2 != 0) value += std::string_view(form) == "UI" ? '\0' : ' ';
-    head(group, element, form);
-    append_number(bytes_, value.size(), 2);
-    bytes_ += value;
-  }
-  void u16(std::uint16_t group, std::uint16_t element, int value) {
-    head(group, element, "US");
-    append_number(bytes_, 2, 2);
-    append_number(bytes_, static_cast<std::uint64_t>(value), 2);
-  }
-  void u32(std::uint16_t group, std::uint16_t element, std::uint64_t value) {
-    head(group, element, "UL");
-    append_number(bytes_, 4, 2);
-    append_number(bytes_, value, 4);
-  }
-  /// Bytes of a form with a long length.
-  void long_bytes(std::uint16_t group,
-                  std::uint16_t element,
-                  const char* form,
-                  const std::string& value) {
-    head(group, element, form);
-    append_number(bytes_, 0, 2);
-    append_number(bytes_, value.size(), 4);
-    bytes_ += value;
-  }
-  [[nodiscard]] const std::string& bytes() const { return bytes_; }
-
- private:
-  void head(std::uint16_t group, std::uint16_t element, const char* form) {
-    append_number(bytes_, group, 2);
-    append_number(bytes_, element, 2);
-    bytes_ += form;
-  }
-  std::string bytes_;
-};
+void add(gdcm::DataSet& data, const gdcm::Tag& tag, gdcm::VR::VRType form, std::string value) {
+  if (value.size() % 2 != 0) value += form == gdcm::VR::UI ? '\0' : ' ';
+  gdcm::DataElement element(tag);
+  element.SetVR(form);
+  element.SetByteValue(value.data(), static_cast<std::uint32_t>(value.size()));
+  data.Insert(element);
+}
 
 /// A decimal string has at most 16 characters.
 std::string decimal(double value) {
@@ -90,7 +59,7 @@ std::string stored_pixels(const Image2d& levels, int stored_bits) {
   bytes.reserve(2 * levels.pixels.size());
   for (const float level : levels.pixels) {
     const auto grey = static_cast<int>(std::nearbyint(level));
-    append_number(bytes, static_cast<std::uint64_t>(white - std::clamp(grey, 0, white)), 2);
+    bytes += two_bytes(white - std::clamp(grey, 0, white));
   }
   return bytes;
 }
@@ -138,52 +107,48 @@ void write_dicom_xray(const Image2d& levels,
     return decimal(first) + "\\" + decimal(second);
   };
 
-  ElementWriter data;
-  data.text(0x0008, 0x0008, "CS", "ORIGINAL\\PRIMARY\\SINGLE PLANE");
-  data.text(0x0008, 0x0016, "UI", kXaStorage);
-  data.text(0x0008, 0x0018, "UI", instance_uid);
-  data.text(0x0008, 0x0060, "CS", "XA");
-  data.text(0x0008, 0x103e, "LO", description.description);
-  data.text(0x0010, 0x0010, "PN", description.patient_id);
-  data.text(0x0010, 0x0020, "LO", description.patient_id);
-  data.text(0x0018, 0x1110, "DS", decimal(description.source_detector_mm));
-  data.text(0x0018, 0x1111, "DS", decimal(description.source_patient_mm));
-  data.text(0x0018,
-            0x1164,
-            "DS",
-            pair(description.imager_spacing_mm.y(), description.imager_spacing_mm.x()));
-  data.text(0x0018, 0x1510, "DS", decimal(description.primary_angle_deg));
-  data.text(0x0018, 0x1511, "DS", decimal(description.secondary_angle_deg));
-  data.text(0x0020, 0x000d, "UI", study_uid);
-  data.text(0x0020, 0x000e, "UI", series_uid);
-  data.text(0x0020, 0x0013, "IS", "1");
+  gdcm::Writer writer;
+  gdcm::DataSet& data = writer.GetFile().GetDataSet();
+  add(data, {0x0008, 0x0008}, gdcm::VR::CS, "ORIGINAL\\PRIMARY\\SINGLE PLANE");
+  add(data, {0x0008, 0x0016}, gdcm::VR::UI, kXaStorage);
+  add(data, {0x0008, 0x0018}, gdcm::VR::UI, instance_uid);
+  add(data, {0x0008, 0x0060}, gdcm::VR::CS, "XA");
+  add(data, {0x0008, 0x103e}, gdcm::VR::LO, description.description);
+  add(data, {0x0010, 0x0010}, gdcm::VR::PN, description.patient_id);
+  add(data, {0x0010, 0x0020}, gdcm::VR::LO, description.patient_id);
+  add(data, {0x0018, 0x1110}, gdcm::VR::DS, decimal(description.source_detector_mm));
+  add(data, {0x0018, 0x1111}, gdcm::VR::DS, decimal(description.source_patient_mm));
+  add(data,
+      {0x0018, 0x1164},
+      gdcm::VR::DS,
+      pair(description.imager_spacing_mm.y(), description.imager_spacing_mm.x()));
+  add(data, {0x0018, 0x1510}, gdcm::VR::DS, decimal(description.primary_angle_deg));
+  add(data, {0x0018, 0x1511}, gdcm::VR::DS, decimal(description.secondary_angle_deg));
+  add(data, {0x0020, 0x000d}, gdcm::VR::UI, study_uid);
+  add(data, {0x0020, 0x000e}, gdcm::VR::UI, series_uid);
+  add(data, {0x0020, 0x0013}, gdcm::VR::IS, "1");
   if (!description.column_direction_ct.isZero(0.0))
-    data.text(0x0020,
-              0x0020,
-              "CS",
-              patient_orientation_letters(description.column_direction_ct) + "\\" +
-                  patient_orientation_letters(description.row_direction_ct));
-  data.u16(0x0028, 0x0002, 1);
-  data.text(0x0028, 0x0004, "CS", "MONOCHROME1");
-  data.u16(0x0028, 0x0010, levels.height);
-  data.u16(0x0028, 0x0011, levels.width);
-  data.u16(0x0028, 0x0100, 16);
-  data.u16(0x0028, 0x0101, description.stored_bits);
-  data.u16(0x0028, 0x0102, description.stored_bits - 1);
-  data.u16(0x0028, 0x0103, 0);
-  data.text(0x0028, 0x1040, "CS", "LIN");
-  data.long_bytes(0x7fe0, 0x0010, "OW", pixels);
-
-  ElementWriter meta;
-  meta.long_bytes(0x0002, 0x0001, "OB", std::string("\0\1", 2));
-  meta.text(0x0002, 0x0002, "UI", kXaStorage);
-  meta.text(0x0002, 0x0003, "UI", instance_uid);
-  meta.text(0x0002, 0x0010, "UI", kExplicitLittleEndian);
-  meta.text(0x0002, 0x0012, "UI", uid_of("attenuation fields"));
-  ElementWriter length;
-  length.u32(0x0002, 0x0000, meta.bytes().size());
-  write_text_file(path,
-                  std::string(128, '\0') + "DICM" + length.bytes() + meta.bytes() + data.bytes());
+    add(data,
+        {0x0020, 0x0020},
+        gdcm::VR::CS,
+        patient_orientation_letters(description.column_direction_ct) + "\\" +
+            patient_orientation_letters(description.row_direction_ct));
+  add(data, {0x0028, 0x0002}, gdcm::VR::US, two_bytes(1));
+  add(data, {0x0028, 0x0004}, gdcm::VR::CS, "MONOCHROME1");
+  add(data, {0x0028, 0x0010}, gdcm::VR::US, two_bytes(levels.height));
+  add(data, {0x0028, 0x0011}, gdcm::VR::US, two_bytes(levels.width));
+  add(data, {0x0028, 0x0100}, gdcm::VR::US, two_bytes(16));
+  add(data, {0x0028, 0x0101}, gdcm::VR::US, two_bytes(description.stored_bits));
+  add(data, {0x0028, 0x0102}, gdcm::VR::US, two_bytes(description.stored_bits - 1));
+  add(data, {0x0028, 0x0103}, gdcm::VR::US, two_bytes(0));
+  add(data, {0x0028, 0x1040}, gdcm::VR::CS, "LIN");
+  add(data, {0x7fe0, 0x0010}, gdcm::VR::OW, pixels);
+  writer.GetFile().GetHeader().SetDataSetTransferSyntax(
+      gdcm::TransferSyntax::ExplicitVRLittleEndian);
+  std::ostringstream file;
+  writer.SetStream(file);
+  check(writer.Write(), "GDCM writes what it is given");
+  write_text_file(path, file.str());
 }
 
 }  // namespace af

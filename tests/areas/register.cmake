@@ -22,7 +22,7 @@ af_add_test(
   register_program_unit_tests
   SOURCES unit/register/register_options_test.cpp unit/register/kept_fields_test.cpp unit/register/results/registration_results_test.cpp
           unit/register/results/slicer_folder_test.cpp
-  LIBS af_registration_program af_image_itk)
+  LIBS af_registration_program)
 af_add_mpi_test(register_mpi_tests SOURCES mpi/multi_start_test.cpp LIBS af_registration_program RANKS 1 2 3 4)
 # Its own operator new belongs into a file of its own.
 set_source_files_properties(support/counted_allocations.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
