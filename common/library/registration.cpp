@@ -84,7 +84,6 @@ registration::CaseLoadOptions load_options(const RegistrationOptions& options,
   registration::CaseLoadOptions result;
   result.renderer = casts ? registration::RendererKind::RayCast : registration::RendererKind::Field;
   result.field_paths = options.fields;
-  result.ct.series_uid = options.ct_series_uid;
   result.attenuation = {options.water_mu_per_mm, options.air_below_hu};
   result.ray_caster.step_mm = method.correction.cast_step_mm(options.step_mm);
   af::throw_if_any(problems(result.attenuation));

@@ -255,7 +255,6 @@ class RegistrationCase:
         water_mu_per_mm: float = ...,
         air_below_hu: int = ...,
         step_mm: float = ...,
-        ct_series_uid: str = ...,
         seed: int = ...,
         threads: int = ...,
         calibration_error_px: float = ...,

@@ -36,7 +36,6 @@ struct RegistrationOptions {
   double water_mu_per_mm = 0.0200;  ///< of ray casting
   int air_below_hu = -900;
   double step_mm = 1.0;
-  std::string ct_series_uid = {};
   std::uint64_t seed = 1;
   bool no_uncertainty = false;  ///< no covariance and no confidence: all of Uncertainty is NaN
   double calibration_error_px = 0.0;  ///< of every view's shift; covariances include it

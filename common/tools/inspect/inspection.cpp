@@ -80,7 +80,7 @@ void refuse_foreign(const fs::path& path, std::string_view beginning) {
     throw needs_conversion({&path, 1}, "is no format of these programs", "", "converted.toml");
 }
 
-void inspect_text(const fs::path& path, const CtReadOptions& options, Inspection& inspection) {
+void inspect_text(const fs::path& path, Inspection& inspection) {
   const std::string text = first_bytes(path, kMarkedBytes);
   if (!is_text(text)) throw not_recognised(path);
   if (has_line(text, "[[case]]")) return inspect_study(path, inspection);
@@ -107,7 +107,7 @@ void inspect_file(const fs::path& path,
   const auto format = sniff_image_format(path);
   if (format == ImageFormat::Dicom) refuse_foreign(path, first_bytes(path, kMarkedBytes));
   if (format) return inspect_image(path, options, inspection);
-  inspect_text(path, options, inspection);
+  inspect_text(path, inspection);
 }
 
 /// The files of a folder that mean something to this project, in the order of their names.

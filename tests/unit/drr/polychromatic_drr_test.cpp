@@ -111,7 +111,7 @@ TEST(PolychromaticDrr, OfTwoFieldsHasTheGradientsOfItsValues) {
   const auto bone = small_field([](const RayNodes& at) { return 2.0 + at.v + at.s + at.t; }, 1);
   const PolychromaticDrr renderer(make_field_renderer(all, "linear"),
                                   make_field_renderer(bone, "linear"),
-                                  attenuation_of({70.0, 2.5, 40}));
+                                  attenuation_of({70.0, 2.5}));
   const View view{small_camera(), {3, 2, 20, 15}};
   const RigidTransform pose = pose_from_parameters({}, small_pose(4));
   // Multilinear fields leave the differences' rounding alone.
