@@ -723,7 +723,7 @@ class ResultsTest(unittest.TestCase):
         self.assertEqual(list(columns["chain"]), ["fast"] * 2)
 
     def test_rows_of_af_evaluate_are_read(self):
-        folder = Path(__file__).resolve().parents[1] / "fuzz" / "runs" / "registration"
+        folder = Path(__file__).resolve().parent / "report_runs" / "registration"
         columns = af.read_registrations(folder / "registrations.csv")
         count = len(columns["case"])
         self.assertGreater(count, 1)
