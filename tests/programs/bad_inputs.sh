@@ -273,11 +273,13 @@ row 2 '--body-only' 'reading of a CT beside a study' "$bin/af-drr" --study valid
 row 4 'LAT.af.h5' 'field of another camera' "${register[@]}" --field AP=LAT.af.h5 --field LAT=AP.af.h5
 head -c 20000 AP.af.h5 >cut.af.h5
 row 4 'cut.af.h5' 'truncated field' "$bin/af-drr" --field cut.af.h5 -o out/drr.mha
-# The first 20 bytes from there on without a zero: HDF5 leaves room that holds nothing, and chunks that were written anew.
+# Within the codewords of a field that is large enough to be mostly these, the first 20 bytes without a zero.
+mapfile -t larger < <(small --uv-nodes 24 --st-nodes 96 --codewords 256)
+"$bin/af-precompute" "${larger[@]}" --study valid/study.toml --camera AP -o larger.af.h5 >message.txt 2>&1
 for percent in 20 30 40 65 80; do
-  cp AP.af.h5 spoilt.af.h5
-  from=$(($(stat --format %s AP.af.h5) * percent / 100))
-  tail --bytes=+$((from + 1)) AP.af.h5 >rest
+  cp larger.af.h5 spoilt.af.h5
+  from=$(($(stat --format %s larger.af.h5) * percent / 100))
+  tail --bytes=+$((from + 1)) larger.af.h5 >rest
   LC_ALL=C grep --null-data --only-matching --byte-offset --text --max-count=1 '.\{20\}' rest >found
   skip=$(head --bytes=20 found)  # "OFFSET:MATCH"
   skip=${skip%%:*}

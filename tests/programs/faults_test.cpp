@@ -171,7 +171,7 @@ TEST_F(Faults, AFullDiskWhileTheFieldIsWrittenEndsTheJobAtOnce) {
     test::LaunchedJob job(precompute(ranks, {"--no-checkpoint"}), output());
     // Said after casting: training still follows.
     ASSERT_TRUE(job.wait_until([] { return said().find("tiles: ") != std::string::npos; }));
-    limit_files(job.ranks(), 500'000);  // more than the deflated codebook has
+    limit_files(job.ranks(), 400'000);  // more than the deflated codebook has
     EXPECT_EQ(job.wait(kEndsWithin), 4) << said();
     EXPECT_THAT(said(),
                 ContainsRegex("writing round 1 of the indices: .*partial: H5Dwrite failed"));
