@@ -5,7 +5,8 @@ import re
 
 import numpy as np
 
-from .errors import FileError
+from af_programs.errors import FileError
+
 from .geometry import inverse, rigid, transform
 from .rig import require
 from .source import numbers_of, numbers_text

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .errors import ConvertError, FileError, InputError
+from af_programs.errors import ProgramError, FileError, InputError
+
 from .own_poses import Frame
 from .source import Source
 from .toml_table import Table, parse_toml
@@ -50,8 +51,8 @@ def inspected(path, options=()):
                          preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_DATA, (most, most)))
     report = json.loads(run.stdout)[0] if run.stdout.startswith("[") else {"error": run.stderr.strip()[-2000:]}
     if run.returncode != 0:
-        error = ConvertError(f"af-inspect ended with exit code {run.returncode}: {report.get('error')}")
-        error.exit_code = run.returncode if run.returncode in (3, 4) else ConvertError.exit_code
+        error = ProgramError(f"af-inspect ended with exit code {run.returncode}: {report.get('error')}")
+        error.exit_code = run.returncode if run.returncode in (3, 4) else ProgramError.exit_code
         raise error
     return report["facts"]
 

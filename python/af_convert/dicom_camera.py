@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
+from af_programs.errors import FileError, InputError
+
 from .dicom_header import is_dicom, items_of, numbers_of, read_header, text_of
-from .errors import FileError, InputError
 from .geometry import Camera, about
 from .rig import StatedCamera, StatedRig, require
 from .source import size_of

@@ -7,7 +7,7 @@ import pydicom
 from pydicom.dataelem import RawDataElement
 from pydicom.uid import DeflatedExplicitVRLittleEndian
 
-from .errors import FileError, InputError, shown
+from af_programs.errors import FileError, InputError, shown
 
 MOST_BYTES = 64 << 20  # before the pixels
 PIXELS = (0x7fe00010, 0x7fe00008, 0x7fe00009)

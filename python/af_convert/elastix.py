@@ -3,7 +3,8 @@
 slice of one voxel in the CT's physical space (LPS, mm). Rays run from its pixels to the focal point."""
 import numpy as np
 
-from .errors import FileError, InputError, shown
+from af_programs.errors import FileError, InputError, shown
+
 from .geometry import Camera, camera_problems
 from .rig import one_camera, require, unread_note
 from .source import lines_of, numbers_of, numbers_text, size_of

@@ -3,9 +3,10 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from af_programs.errors import FileError, InputError
+
 from . import (autoscoper, diffdrr, dicom_camera, elastix, itk, matrices, mayacam, opencv, own_poses, plastimatch, rad,
                registration, rig_toml, rtk, xreg)
-from .errors import FileError, InputError
 from .rig import Rig, completed_rig, require
 from .source import Source
 

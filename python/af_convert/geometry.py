@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .errors import InputError
+from af_programs.errors import InputError
 
 MOST_ROOM_MM = 1e6
 PLAUSIBLE_ROOM = "must be finite and within 1e6 mm (1 km)"

@@ -10,7 +10,7 @@ import signal
 import h5py
 import numpy as np
 
-from .errors import FileError
+from af_programs.errors import FileError
 
 MARK = b"\x89HDF\r\n\x1a\n"
 MOST_NUMBERS = 16  # of a dataset that is read

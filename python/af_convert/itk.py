@@ -5,8 +5,9 @@ import math
 
 import numpy as np
 
+from af_programs.errors import FileError, InputError, shown
+
 from . import hdf5
-from .errors import FileError, InputError, shown
 from .geometry import about, inverse, quaternion_rotation, rigid, transform
 from .rig import require
 from .source import number_of, numbers_text

@@ -3,7 +3,8 @@
 that this project writes state what a matrix leaves open: # camera, # size_px, # pixel_spacing_mm, # isocenter_point."""
 import numpy as np
 
-from .errors import FileError, InputError
+from af_programs.errors import FileError, InputError
+
 from .geometry import camera_from_matrix, pinhole_of
 from .rig import StatedCamera, StatedRig
 from .source import is_number, numbers_of, numbers_text, rows_text, size_of

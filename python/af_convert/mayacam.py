@@ -5,7 +5,8 @@ import math
 
 import numpy as np
 
-from .errors import FileError, InputError, shown
+from af_programs.errors import FileError, InputError, shown
+
 from .geometry import angles_zyx, camera_from_pinhole, pinhole_of, rotation_zyx
 from .rig import one_camera
 from .source import is_number, line_numbers, numbers_text, rows_text, size_of

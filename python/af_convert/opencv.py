@@ -7,7 +7,8 @@ import re
 import numpy as np
 import yaml
 
-from .errors import FileError, InputError, shown
+from af_programs.errors import FileError, InputError, shown
+
 from .geometry import camera_from_pinhole, pinhole_of, vector_rotation
 from .rig import StatedCamera, StatedRig, unread_note, with_rows_flipped
 from .source import is_number, number_of, numbers_text, size_of, toml_text

@@ -5,7 +5,8 @@ import json
 
 import numpy as np
 
-from .errors import FileError, InputError, shown
+from af_programs.errors import FileError, InputError, shown
+
 from .geometry import rigid, rotation_zyx, transform
 from .rig import require, unread_note
 from .source import is_number, lines_of, number_of, number_text, numbers_of, rows_text, toml_numbers

@@ -7,7 +7,8 @@ import shlex
 
 import numpy as np
 
-from .errors import FileError, InputError, shown
+from af_programs.errors import FileError, InputError, shown
+
 from .geometry import Camera, camera_from_pinhole, pinhole_of, transform
 from .rig import StatedRig, StatedCamera, one_camera, require
 from .source import is_number, line_numbers, lines_of, number_text, numbers_of, numbers_text, rows_text, size_of

@@ -8,10 +8,10 @@ import re
 import sys
 
 from af_programs.argument_pages import add_common_options
+from af_programs.errors import ProgramError, FileError, InputError
 
 from . import formats
 from .context import Context, Study
-from .errors import ConvertError, FileError, InputError
 from .rig import RigOptions, require
 from .rig_toml import write_rig_toml
 from .source import Source
@@ -95,7 +95,7 @@ def main(arguments=None):
             print(f"af-convert: warning: {note}", file=sys.stderr)
         for path, content in outputs:
             write(path, content)
-    except ConvertError as error:
+    except ProgramError as error:
         print(f"af-convert: error: {error}", file=sys.stderr)
         return error.exit_code
     except MemoryError:

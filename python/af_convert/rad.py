@@ -3,7 +3,8 @@
 the detector's frame to the world (mm): origin at the centre of pixel (0, 0), x along columns, y along rows, z to the source."""
 import numpy as np
 
-from .errors import FileError, shown
+from af_programs.errors import FileError, shown
+
 from .geometry import Camera, rigid, transform
 from .rig import one_camera, require, unread_note
 from .source import line_numbers, lines_of, numbers_of, numbers_text, rows_text, size_of

@@ -9,8 +9,9 @@ import pydicom
 from pydicom.dataset import Dataset, FileMetaDataset
 from pydicom.sequence import Sequence
 
+from af_programs.errors import FileError, InputError, shown
+
 from .dicom_header import is_dicom, items_of, numbers_of, read_header, text_of
-from .errors import FileError, InputError, shown
 from .geometry import inverse, rigid
 from .rig import require
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .errors import InputError
+from af_programs.errors import InputError
+
 from .geometry import MOST_ROOM_MM, PLAUSIBLE_ROOM, Camera, camera_problems, vector_text, with_clean_axes, with_column_spacing
 
 # Where the detector stands when only the rays are known: the magnification of a usual C-arm.

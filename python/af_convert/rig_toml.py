@@ -2,7 +2,8 @@
 """This project's rig.toml."""
 import numpy as np
 
-from .errors import InputError
+from af_programs.errors import InputError
+
 from .geometry import Camera, camera_from_matrix, camera_problems, with_clean_axes
 from .rig import StatedCamera, StatedRig, name_problem
 from .source import toml_numbers, toml_text

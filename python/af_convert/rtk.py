@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .errors import FileError, InputError, shown
+from af_programs.errors import FileError, InputError, shown
+
 from .geometry import Camera, about
 from .rig import StatedCamera, StatedRig, require
 from .source import lines_of, number_of, number_text, numbers_of

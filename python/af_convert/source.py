@@ -7,7 +7,7 @@ import re
 
 import numpy as np
 
-from .errors import FileError, InputError, shown
+from af_programs.errors import FileError, InputError, shown
 
 HEAD_BYTES = 4096
 MOST_TEXT_BYTES = 8 << 20

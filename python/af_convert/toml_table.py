@@ -5,7 +5,7 @@ import tomllib
 
 import numpy as np
 
-from .errors import FileError, InputError, shown
+from af_programs.errors import FileError, InputError, shown
 
 MOST_BYTES = 4 << 20
 REQUIRED = object()

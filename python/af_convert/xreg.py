@@ -5,8 +5,9 @@ cam-coord-frame-type says which frame: the source at the origin and the detector
 origin on the detector and the source at +z."""
 import numpy as np
 
+from af_programs.errors import FileError, shown
+
 from . import hdf5
-from .errors import FileError, shown
 from .geometry import camera_from_pinhole, pinhole_of, rigid, transform
 from .rig import StatedCamera, StatedRig, require
 from .source import size_of

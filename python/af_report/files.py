@@ -5,7 +5,7 @@ import io
 import math
 import os
 
-from .problems import Unreadable
+from af_programs.errors import FileError
 
 
 class Row(dict):
@@ -15,7 +15,7 @@ class Row(dict):
 
     def text(self, column):
         if column not in self:
-            raise Unreadable(f"{self.where}: column {column} is missing")
+            raise FileError(f"{self.where}: column {column} is missing")
         return self[column]
 
     def number(self, column):
@@ -24,27 +24,27 @@ class Row(dict):
         try:
             return float(text) if text else math.nan
         except ValueError:
-            raise Unreadable(f"{self.where}: {column} = '{text}': must be a number") from None
+            raise FileError(f"{self.where}: {column} = '{text}': must be a number") from None
 
 
 def rows_of(path):
-    """The rows of a CSV one by one. Unreadable: no such file, a line that is cut off, no header."""
+    """The rows of a CSV one by one. FileError: no such file, a line that is cut off, no header."""
     try:
         with open(path, encoding="utf-8", newline="") as file:
             reader = csv.reader(file, strict=True)
             header = next(reader, None)
             if not header:
-                raise Unreadable(f"{path}: has no line of column names")
+                raise FileError(f"{path}: has no line of column names")
             for cells in reader:
                 if len(cells) != len(header):
-                    raise Unreadable(f"{path}:{reader.line_num}: has {len(cells)} cells, the header {len(header)}")
+                    raise FileError(f"{path}:{reader.line_num}: has {len(cells)} cells, the header {len(header)}")
                 row = Row(zip(header, cells))
                 row.where = f"{path}:{reader.line_num}"
                 yield row
     except OSError as error:
-        raise Unreadable(f"{path}: {error.strerror}") from None
+        raise FileError(f"{path}: {error.strerror}") from None
     except (UnicodeDecodeError, csv.Error) as error:
-        raise Unreadable(f"{path}: is no CSV: {error}") from None
+        raise FileError(f"{path}: is no CSV: {error}") from None
 
 
 def columns_of(path):
@@ -52,7 +52,7 @@ def columns_of(path):
         with open(path, encoding="utf-8", newline="") as file:
             return next(csv.reader(file), [])
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise Unreadable(f"{path}: {error}") from None
+        raise FileError(f"{path}: {error}") from None
 
 
 def write_file(path, content):
@@ -63,7 +63,7 @@ def write_file(path, content):
             file.write(content.encode("utf-8") if isinstance(content, str) else content)
         os.replace(partial, path)
     except OSError as error:
-        raise Unreadable(f"{path}: {error.strerror}") from None
+        raise FileError(f"{path}: {error.strerror}") from None
 
 
 def csv_text(columns, rows):

@@ -5,9 +5,10 @@ from pathlib import Path
 import jinja2
 from markupsafe import Markup
 
+from af_programs.errors import FileError
+
 from . import other_kinds, provenance, registration
 from .blocks import Section, Terms
-from .problems import Unreadable
 
 FOLDER = Path(__file__).resolve().parent
 
@@ -37,7 +38,7 @@ def sections(of):
 
 
 def page(runs, output, title):
-    """The page as text. Unreadable: a summary.json lacks something."""
+    """The page as text. FileError: a summary.json lacks something."""
     for run in runs:
         run.page_folder = Path(output).resolve().parent
     try:
@@ -57,4 +58,4 @@ def page(runs, output, title):
             comparison=registration.comparison(registrations) if registrations else None, caution=provenance.caution(registrations),
             sections=[*sections(of), provenance.provenance(runs)])
     except (KeyError, IndexError, TypeError, AttributeError, ValueError, OverflowError, ZeroDivisionError) as error:
-        raise Unreadable(f"summary.json or a table of a run lacks something, or holds something else than a number or a text: {error!r}") from error
+        raise FileError(f"summary.json or a table of a run lacks something, or holds something else than a number or a text: {error!r}") from error

@@ -6,8 +6,7 @@ import sys
 from pathlib import Path
 
 from af_programs.argument_pages import add_common_options
-
-from .problems import ReportError, Unacceptable, Unreadable
+from af_programs.errors import FileError, InputError, ProgramError
 
 MODULES = {"jinja2": "python3-jinja2", "matplotlib": "python3-matplotlib"}
 
@@ -33,7 +32,7 @@ def write_page(options):
     from .runs import find_runs
     output = Path(options.output)
     if output.is_dir() or not output.resolve().parent.is_dir():
-        raise Unreadable(f"--output = {output}: must be a file in a folder that exists")
+        raise FileError(f"--output = {output}: must be a file in a folder that exists")
     runs = find_runs(options.paths)
     write_file(output, page(runs, output, options.title))
     print(f"report of {len(runs)} run(s): {output}")
@@ -58,7 +57,7 @@ def draw_table(path, is_screen):
             if text:
                 write_table(text, path.with_suffix(".md"))
             return
-    raise Unacceptable(f"{path}: columns = {', '.join(columns)[:80]}: must be those of a table of af-evaluate compare or held-out, of "
+    raise InputError(f"{path}: columns = {', '.join(columns)[:80]}: must be those of a table of af-evaluate compare or held-out, of "
                        "jobs/rate-against-truth.sh, or of bench-scaling")
 
 
@@ -85,7 +84,7 @@ def draw_folder(folder):
         are_papers = bool(parts) and all(part is not None and is_papers_setting(Run(folder, part)) for part in parts)
         figures.save(figures.psnr_boxes(groups, are_papers), folder / "psnr")
     else:
-        raise Unacceptable(f"PATH = {folder}: holds no results of af-evaluate")
+        raise InputError(f"PATH = {folder}: holds no results of af-evaluate")
 
 
 def run(options):
@@ -98,7 +97,7 @@ def run(options):
         elif path.is_file():
             draw_table(path, options.screen)
         else:
-            raise Unreadable(f"{path}: does not exist")
+            raise FileError(f"{path}: does not exist")
 
 
 def main():
@@ -109,8 +108,8 @@ def main():
         run(options)
         sys.stdout.flush()
         return 0
-    except ReportError as error:
-        problem, code = str(error), error.code
+    except ProgramError as error:
+        problem, code = str(error), error.exit_code
     except ModuleNotFoundError as error:
         if error.name not in MODULES:
             raise

@@ -7,9 +7,10 @@ import urllib.parse
 from functools import cached_property
 from pathlib import Path
 
+from af_programs.errors import FileError, InputError
+
 from .files import rows_of
 from .numbers import as_number
-from .problems import Unacceptable, Unreadable
 
 FORMAT, VERSION = "attenuation-fields evaluation", 1
 KINDS = ("registration", "error-budget", "similarity-curves", "image-quality", "field-parameters")
@@ -22,10 +23,10 @@ class Run:
         self.page_folder = folder
 
     def path(self, relative):
-        """A file of the run. Unreadable when that, or a link in it, leads out of the folder."""
+        """A file of the run. FileError when that, or a link in it, leads out of the folder."""
         path = (self.folder / str(relative)).resolve()
         if path == self.folder or self.folder not in path.parents:
-            raise Unreadable(f"{self.folder / 'summary.json'}: names '{relative}', which is not a file of the run")
+            raise FileError(f"{self.folder / 'summary.json'}: names '{relative}', which is not a file of the run")
         return path
 
     def rows(self, name):
@@ -35,7 +36,7 @@ class Run:
         try:
             return self.path(name).read_bytes()
         except (OSError, ValueError) as error:
-            raise Unreadable(f"{self.folder / str(name)}: {error}") from None
+            raise FileError(f"{self.folder / str(name)}: {error}") from None
 
     def link(self, relative):
         self.path(relative)
@@ -80,16 +81,16 @@ def read_summary(path):
     try:
         summary = json.loads(path.read_bytes())
     except (OSError, ValueError, RecursionError) as error:
-        raise Unreadable(f"{path}: {error}") from None
+        raise FileError(f"{path}: {error}") from None
     if not isinstance(summary, dict):
-        raise Unreadable(f"{path}: is no JSON object")
+        raise FileError(f"{path}: is no JSON object")
     # Other programs may leave a summary.json, too.
     if summary.get("format") != FORMAT:
         return None
     if summary.get("format_version") != VERSION:
-        raise Unreadable(f"{path}: format_version = {summary.get('format_version')}: must be {VERSION}")
+        raise FileError(f"{path}: format_version = {summary.get('format_version')}: must be {VERSION}")
     if summary.get("kind") not in KINDS:
-        raise Unreadable(f"{path}: kind = {summary.get('kind')}: must be one of {', '.join(KINDS)}")
+        raise FileError(f"{path}: kind = {summary.get('kind')}: must be one of {', '.join(KINDS)}")
     return summary
 
 
@@ -99,7 +100,7 @@ def find_runs(folders):
     named, found = {Path(folder).resolve() for folder in folders}, set()
     for folder in map(Path, folders):
         if not folder.is_dir():
-            raise Unreadable(f"{folder}: is not a folder of results")
+            raise FileError(f"{folder}: is not a folder of results")
         for place, _, names in os.walk(folder):
             path = Path(place) / "summary.json"
             if "summary.json" in names and not path.is_symlink():
@@ -110,7 +111,7 @@ def find_runs(folders):
         if summary is not None and ("only_start" not in summary or folder in named):
             runs.append(Run(folder, summary))
     if not runs:
-        raise Unacceptable(f"RUN = {folders[0]}: holds no finished run of af-evaluate")
+        raise InputError(f"RUN = {folders[0]}: holds no finished run of af-evaluate")
     set_names(runs)
     return sorted(runs, key=lambda run: (KINDS.index(run.kind), not begins_with_default(run), run.folder))
 

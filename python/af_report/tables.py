@@ -4,9 +4,10 @@ import json
 import math
 from pathlib import Path
 
+from af_programs.errors import FileError
+
 from .files import rows_of
 from .numbers import as_number
-from .problems import Unreadable
 
 
 def fixed(value, decimals):
@@ -218,4 +219,4 @@ def budget_of(path):
     try:
         return error_budget(json.loads(Path(path).read_text(encoding="utf-8")))
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise Unreadable(f"{path}: {error!r}") from None
+        raise FileError(f"{path}: {error!r}") from None

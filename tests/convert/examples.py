@@ -18,7 +18,7 @@ sys.dont_write_bytecode = True
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "python"))
 from af_convert import formats  # noqa: E402
 from af_convert.context import Grid  # noqa: E402
-from af_convert.errors import FileError, InputError  # noqa: E402
+from af_programs.errors import FileError, InputError  # noqa: E402
 from af_convert.geometry import Camera, rotation_zyx, transform  # noqa: E402
 from af_convert.own_poses import Frame  # noqa: E402
 from af_convert.rig import Rig, RigOptions  # noqa: E402

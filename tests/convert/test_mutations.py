@@ -12,7 +12,7 @@ import time
 import numpy as np
 
 from examples import *  # noqa: F403
-from af_convert.errors import ConvertError
+from af_programs.errors import ProgramError
 from test_formats import WRITTEN as WRITTEN_CAMERAS
 from test_formats import writable_rig
 from test_poses import WRITTEN as WRITTEN_POSES
@@ -80,7 +80,7 @@ def outcome(path, options):
         for _, pose in formats.read_poses(path, KnownContext())[0]:
             np.testing.assert_allclose(pose[:3, :3] @ pose[:3, :3].T, np.eye(3), atol=1e-9)
         return "poses"
-    except ConvertError as error:
+    except ProgramError as error:
         return type(error).__name__
 
 

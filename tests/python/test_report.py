@@ -22,7 +22,7 @@ sys.dont_write_bytecode = True
 sys.path.insert(0, str(PROGRAM.resolve().parent))
 
 from af_report import failures, figures, numbers, page, provenance, registration, runs  # noqa: E402
-from af_report.problems import ReportError  # noqa: E402
+from af_programs.errors import ProgramError  # noqa: E402
 
 RUNS = Path(__file__).resolve().parent / "report_runs"
 SECRET = b"af-secret-af-secret-af-secret-"
@@ -216,8 +216,8 @@ class Pages(Copied):
             (self.folder / kind / "summary.json").write_text(json.dumps(summary))
             try:
                 text = page.page(runs.find_runs([self.folder / kind]), self.folder / "page.html", "")
-            except ReportError as error:
-                self.assertIn(error.code, (3, 4))
+            except ProgramError as error:
+                self.assertIn(error.exit_code, (3, 4))
                 continue
             made += 1
             found = Page(text)
@@ -245,10 +245,10 @@ class Runs(Copied):
     def test_give_only_their_own_files(self):
         found = runs.find_runs([self.folder / "registration"])[0]
         for name in ("../secret", "/etc/hostname", "", ".", "..", "link.png", "a/../../x"):
-            with self.assertRaises(ReportError, msg=name):
+            with self.assertRaises(ProgramError, msg=name):
                 found.picture(name)
             if name != "link.png":
-                with self.assertRaises(ReportError, msg=name):
+                with self.assertRaises(ProgramError, msg=name):
                     found.link(name)
 
 

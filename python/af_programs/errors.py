@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What ends af-convert, with its exit code."""
+"""What ends a program with one line, and its exit code."""
 
 
-class ConvertError(Exception):
+class ProgramError(Exception):
     exit_code = 6
 
 
-class InputError(ConvertError):
+class InputError(ProgramError):
     """Readable, unacceptable."""
     exit_code = 3
 
 
-class FileError(ConvertError):
+class FileError(ProgramError):
     """Unreadable, damaged, or a file of another kind."""
     exit_code = 4
 
