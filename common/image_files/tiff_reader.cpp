@@ -171,7 +171,7 @@ std::uint16_t packed_value(const unsigned char* row, std::size_t column, int bit
                    left = static_cast<std::size_t>(bits);
        left > 0;
        ++bit, --left)
-    value = value << 1 | (row[bit / 8] >> (7 - bit % 8) & 1u);
+    value = value << 1 | (static_cast<std::uint32_t>(row[bit / 8]) >> (7 - bit % 8) & 1u);
   return static_cast<std::uint16_t>(value);
 }
 
