@@ -270,6 +270,7 @@ sed 's/^ct = .*/&\nct_values = "raw"\nct_raw_slope_per_mm = 0.00003\nct_raw_offs
 row 4 'read with mu = 3e-05 * value + 0.02 per mm' 'field of a CT that is read otherwise' "$bin/af-register" \
   --study valid/raw.toml -o out/result --field AP=AP.af.h5 --field LAT=LAT.af.h5
 row 2 '--body-only' 'reading of a CT beside a study' "$bin/af-drr" --study valid/study.toml --camera AP --body-only -o out/drr.mha
+row 3 'is a study' 'reading of a CT to inspect a study' "$bin/af-inspect" valid/study.toml --body-only
 row 4 'LAT.af.h5' 'field of another camera' "${register[@]}" --field AP=LAT.af.h5 --field LAT=AP.af.h5
 head -c 20000 AP.af.h5 >cut.af.h5
 row 4 'cut.af.h5' 'truncated field' "$bin/af-drr" --field cut.af.h5 -o out/drr.mha

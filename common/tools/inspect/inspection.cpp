@@ -80,10 +80,16 @@ void refuse_foreign(const fs::path& path, std::string_view beginning) {
     throw needs_conversion({&path, 1}, "is no format of these programs", "", "converted.toml");
 }
 
-void inspect_text(const fs::path& path, Inspection& inspection) {
+void inspect_text(const fs::path& path, const CtReadOptions& options, Inspection& inspection) {
   const std::string text = first_bytes(path, kMarkedBytes);
   if (!is_text(text)) throw not_recognised(path);
-  if (has_line(text, "[[case]]")) return inspect_study(path, inspection);
+  if (has_line(text, "[[case]]")) {
+    if (!options.text().empty() || !options.series_uid.empty())
+      throw InputError(path.string() +
+                       ": is a study, whose cases say how their CTs are read (ct_values, "
+                       "ct_resample, ...); options of reading a CT must not be given with it");
+    return inspect_study(path, inspection);
+  }
   if (has_line(text, "[[camera]]") || is_matrix_text(text))
     return inspect_rig(path.string(), inspection);
   const std::size_t first = text.find_first_not_of(" \t\r\n");
@@ -107,7 +113,7 @@ void inspect_file(const fs::path& path,
   const auto format = sniff_image_format(path);
   if (format == ImageFormat::Dicom) refuse_foreign(path, first_bytes(path, kMarkedBytes));
   if (format) return inspect_image(path, options, inspection);
-  inspect_text(path, inspection);
+  inspect_text(path, options, inspection);
 }
 
 /// The files of a folder that mean something to this project, in the order of their names.
