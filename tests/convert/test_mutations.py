@@ -103,8 +103,7 @@ def main():
             try:
                 ends[outcome(path, RigOptions(**OPTIONS) if i % 2 else RigOptions())] += 1
             except BaseException:
-                pathlib.Path("/tmp/af-convert-mutation").write_bytes(content)
-                print(f"mutation {i}, kept as /tmp/af-convert-mutation")
+                print(f"mutation {i}: {content!r}")
                 raise
             slowest = max(slowest, cpu_seconds() - started)
         seconds = time.monotonic() - begin
