@@ -8,17 +8,17 @@
 #include "cli/sub_command.h"
 #include "evaluate/image_quality/evaluate_image_quality.h"
 #include "evaluate/image_quality/measure_held_out.h"
-#include "evaluate/methods/evaluated_methods.h"
-#include "evaluate/population/measure_population.h"
 #include "evaluate/registration/compare_methods.h"
 #include "evaluate/registration/evaluate_registrations.h"
+#include "evaluate/registration/evaluated_methods.h"
 #include "evaluate/registration/join_studies.h"
+#include "evaluate/registration/measure_population.h"
 #include "evaluate/report/make_report.h"
 #include "evaluate/sweeps/draw_similarity_curves.h"
 #include "evaluate/sweeps/make_error_budget.h"
 #include "evaluate/sweeps/measure_lattice_errors.h"
 #include "evaluate/sweeps/sweep_field_parameters.h"
-#include "text/shell_words.h"
+#include "files/shell_words.h"
 
 // Outside app_main only the declaration of options can throw, which is a defect of this program.
 // NOLINTNEXTLINE(bugprone-exception-escape)

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Whether registrations know their own errors: fits the constants of register/uncertainty/calibration.cpp to the
+"""Whether registrations know their own errors: fits the constants of register/verdict/calibration.cpp to the
 registrations of a population study (jobs/population.sh, jobs/bones.sh), whose truth is known, on the patients of odd
 numbers, and prints how well they do on the others; with --folds to all drawn patients, each judged by constants that
 patients of other folds gave. Patients that were not drawn, which have no number, are never fitted. Needs nothing but

@@ -7,13 +7,13 @@
 #include <string>
 #include <vector>
 
-#include "field_file/field_file.h"
+#include "field/field_file.h"
+#include "precompute/build/field_build.h"
 #include "precompute/codebook/codebook_training.h"
 #include "precompute/codebook/filter_fitting.h"
 #include "precompute/design_choice.h"
 #include "precompute/phase_clock.h"
-#include "precompute/pipeline/field_build.h"
-#include "run/provenance.h"
+#include "ranks/provenance.h"
 
 namespace af {
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <utility>
 
-#include "text/options_toml.h"
+#include "files/options_toml.h"
 
 namespace af {
 

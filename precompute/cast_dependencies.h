@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "precompute/field_parts.h"
-#include "run/deciding_values.h"
+#include "ranks/deciding_values.h"
 
 namespace af {
 

@@ -3,9 +3,9 @@
 
 #include <chrono>
 
+#include "precompute/build/field_build.h"
 #include "precompute/design/design_probe.h"
 #include "precompute/formatted_text.h"
-#include "precompute/pipeline/field_build.h"
 
 namespace af {
 

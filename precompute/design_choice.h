@@ -4,9 +4,9 @@
 #include <string>
 
 #include "field/attenuation_quantizer.h"
-#include "parallel/communicator.h"
 #include "precompute/design/design_search.h"
 #include "precompute/field_source.h"
+#include "ranks/communicator.h"
 
 namespace af {
 

@@ -5,12 +5,12 @@
 #include <string>
 #include <vector>
 
+#include "precompute/build/field_build.h"
+#include "precompute/build/memory_plan.h"
+#include "precompute/build/precompute_options.h"
+#include "precompute/build/speed_sample.h"
 #include "precompute/field_parts.h"
 #include "precompute/phase_clock.h"
-#include "precompute/pipeline/field_build.h"
-#include "precompute/plan/memory_plan.h"
-#include "precompute/plan/precompute_options.h"
-#include "precompute/plan/speed_sample.h"
 
 namespace af {
 

@@ -7,18 +7,18 @@
 
 #include "base/error.h"
 #include "base/stored_bytes.h"
+#include "files/toml_reader.h"
 #include "geometry/orbit.h"
 #include "geometry/slab_sizing.h"
+#include "precompute/build/orbit_text.h"
 #include "precompute/casting/casters.h"
 #include "precompute/casting/corrected_caster.h"
 #include "precompute/casting/joined_caster.h"
 #include "precompute/casting/least_squares_caster.h"
 #include "precompute/casting/unit_costs.h"
 #include "precompute/formatted_text.h"
-#include "precompute/plan/orbit_text.h"
 #include "study/rig_file.h"
 #include "study/shared_inputs.h"
-#include "text/toml_reader.h"
 
 namespace af {
 

@@ -9,12 +9,12 @@
 #include "field/attenuation_quantizer.h"
 #include "geometry/field_lattice.h"
 #include "geometry/light_slab.h"
-#include "parallel/communicator.h"
 #include "precompute/casting/depth_slabs.h"
 #include "precompute/casting/field_caster.h"
 #include "precompute/casting/slab_aligned_volume.h"
+#include "precompute/casting/work_unit.h"
 #include "precompute/field_source.h"
-#include "precompute/units/work_unit.h"
+#include "ranks/communicator.h"
 
 namespace af {
 

@@ -6,12 +6,12 @@
 
 #include "base/error.h"
 #include "base/joined.h"
-#include "pose_files/pose_file.h"
+#include "files/shell_words.h"
 #include "study/node_ct.h"
+#include "study/pose_file.h"
 #include "study/rig_file.h"
 #include "study/shared_inputs.h"
 #include "study/target_place.h"
-#include "text/shell_words.h"
 
 namespace af {
 

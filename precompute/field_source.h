@@ -6,15 +6,15 @@
 #include <string>
 #include <vector>
 
+#include "ct/attenuation_volume.h"
+#include "ct/ct_identity.h"
+#include "ct/ct_read_options.h"
 #include "geometry/camera_geometry.h"
 #include "geometry/rigid_transform.h"
 #include "geometry/slab_sizing.h"
-#include "parallel/communicator.h"
+#include "precompute/build/precompute_options.h"
 #include "precompute/measured_views.h"
-#include "precompute/plan/precompute_options.h"
-#include "volume/attenuation_volume.h"
-#include "volume/ct_identity.h"
-#include "volume/ct_read_options.h"
+#include "ranks/communicator.h"
 
 namespace af {
 

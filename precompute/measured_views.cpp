@@ -9,9 +9,9 @@
 #include "base/error.h"
 #include "drr/ray_cast_drr.h"
 #include "files/sha256.h"
-#include "image/gaussian_blur.h"
 #include "study/shared_inputs.h"
 #include "study/xray_reader.h"
+#include "xray/gaussian_blur.h"
 
 namespace af {
 

@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "parallel/communicator.h"
+#include "ct/attenuation_volume.h"
+#include "precompute/build/precompute_options.h"
 #include "precompute/casting/measured_residual.h"
-#include "precompute/plan/precompute_options.h"
-#include "volume/attenuation_volume.h"
+#include "ranks/communicator.h"
 
 namespace af {
 

@@ -3,8 +3,8 @@
 
 #include <string>
 
-#include "parallel/communicator.h"
-#include "precompute/plan/precompute_options.h"
+#include "precompute/build/precompute_options.h"
+#include "ranks/communicator.h"
 
 namespace af {
 

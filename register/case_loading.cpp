@@ -8,7 +8,7 @@
 #include "base/joined.h"
 #include "base/number_text.h"
 #include "base/stored_bytes.h"
-#include "field_use/opened_field.h"
+#include "drr/opened_field.h"
 #include "files/sha256.h"
 #include "geometry/camera_distance.h"
 #include "register/case_renderers.h"

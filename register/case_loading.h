@@ -9,12 +9,12 @@
 #include <vector>
 
 #include "base/thread_pool.h"
+#include "ct/ray_caster.h"
 #include "drr/xray_beam.h"
-#include "parallel/communicator.h"
+#include "ranks/communicator.h"
+#include "ranks/input_identity.h"
 #include "register/method/registration.h"
-#include "run/input_identity.h"
 #include "study/study_file.h"
-#include "volume/ray_caster.h"
 
 namespace af::registration {
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/stored_bytes.h"
+#include "ct/blurred_volume.h"
 #include "drr/field_level.h"
 #include "drr/field_renderer.h"
 #include "drr/field_set_drr.h"
@@ -18,7 +19,6 @@
 #include "drr/two_pass_af_drr.h"
 #include "geometry/motion_range.h"
 #include "study/node_ct.h"
-#include "volume/blurred_volume.h"
 
 namespace af::registration {
 namespace {

@@ -6,12 +6,12 @@
 #include <string>
 #include <vector>
 
+#include "ct/attenuation_volume.h"
+#include "drr/opened_field.h"
 #include "drr/xray_beam.h"
-#include "field_use/opened_field.h"
-#include "parallel/communicator.h"
+#include "ranks/communicator.h"
 #include "register/case_loading.h"
 #include "register/problem/registration_problem.h"
-#include "volume/attenuation_volume.h"
 
 namespace af::registration {
 

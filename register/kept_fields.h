@@ -9,7 +9,7 @@
 #include <string>
 
 #include "base/thread_pool.h"
-#include "field_use/opened_field.h"
+#include "drr/opened_field.h"
 #include "register/case_renderers.h"
 #include "study/study_file.h"
 

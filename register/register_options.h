@@ -12,7 +12,7 @@
 #include "register/field_paths.h"
 #include "register/method/method_options.h"
 #include "register/method/registration.h"
-#include "register/uncertainty/uncertainty_estimator.h"
+#include "register/verdict/uncertainty_estimator.h"
 
 namespace af::registration {
 

@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "parallel/communicator.h"
-#include "pose_files/pose_format.h"
+#include "ranks/communicator.h"
+#include "ranks/resumable_items.h"
 #include "register/register_options.h"
-#include "register/uncertainty/registrar.h"
-#include "run/resumable_items.h"
+#include "register/verdict/registrar.h"
+#include "study/pose_format.h"
 
 namespace af::registration {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A struct of options describes itself once. Command line (cli/bind_options.h), TOML of the options
-// in force and keys of unfinished work (text/options_toml.h) and the check of its values
+// in force and keys of unfinished work (files/options_toml.h) and the check of its values
 // (field_problems()) follow from that:
 //
 //     struct FieldDesign {

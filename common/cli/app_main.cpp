@@ -26,10 +26,10 @@
 #include "cli/slicer_module.h"
 #include "cli/usage_message.h"
 #include "files/output_lock.h"
-#include "parallel/mpi_environment.h"
-#include "parallel/work_watch.h"
-#include "run/stop_request.h"
-#include "text/shell_words.h"
+#include "files/shell_words.h"
+#include "ranks/mpi_environment.h"
+#include "ranks/stop_request.h"
+#include "ranks/work_watch.h"
 
 namespace af::cli {
 

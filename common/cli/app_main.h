@@ -6,7 +6,7 @@
 #include <string>
 
 #include "cli/app_forward.h"
-#include "parallel/communicator.h"
+#include "ranks/communicator.h"
 
 namespace af::cli {
 

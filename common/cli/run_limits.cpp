@@ -2,7 +2,7 @@
 #include "cli/run_limits.h"
 
 #include "cli/bind_options.h"
-#include "run/stop_request.h"
+#include "ranks/stop_request.h"
 
 namespace af::cli {
 

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "cli/bind_options.h"
-#include "parallel/communicator.h"
+#include "ranks/communicator.h"
 
 namespace af::cli {
 

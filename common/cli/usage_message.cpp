@@ -9,7 +9,7 @@
 
 #include "base/error.h"
 #include "cli/command_help.h"
-#include "text/nearest_name.h"
+#include "files/nearest_name.h"
 
 namespace af::cli {
 

@@ -20,6 +20,9 @@ target_compile_options(
             -fPIC -fvisibility=hidden -fvisibility-inlines-hidden)
 target_include_directories(af_compile_options INTERFACE ${PROJECT_SOURCE_DIR} ${PROJECT_SOURCE_DIR}/common)
 
+# A program loads what it calls: a test of geometry no MPI.
+add_link_options(-Wl,--as-needed)
+
 if(AF_SANITIZE)
   list(TRANSFORM AF_SANITIZE PREPEND -fsanitize= OUTPUT_VARIABLE af_sanitize_flags)
   # Undefined behaviour ends the process: a finding fails its test wherever that process was started from.
@@ -87,11 +90,18 @@ function(af_compile_as way target)
   endif()
 endfunction()
 
-# af_add_library(<name> [QUICK|PROGRAM] SOURCES ... [PUBLIC libs...] [PRIVATE libs...])
+# af_add_library(<name> [QUICK|PROGRAM] SOURCES ... [USES folders...] [PUBLIC libs...] [PRIVATE libs...]): the library of
+# a folder. USES: the folders that its sources include, whose libraries stand already, so that no circle can arise;
+# tests/checks/layering.py holds the includes against them. The others are libraries of other people.
 function(af_add_library name)
-  cmake_parse_arguments(arg "QUICK;PROGRAM" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  cmake_parse_arguments(arg "QUICK;PROGRAM" "" "SOURCES;USES;PUBLIC;PRIVATE" ${ARGN})
+  foreach(used ${arg_USES})
+    if(NOT TARGET ${used})
+      message(FATAL_ERROR "${name} uses ${used}, which does not stand above it in the list of CMakeLists.txt")
+    endif()
+  endforeach()
   add_library(${name} STATIC ${arg_SOURCES})
-  target_link_libraries(${name} PUBLIC ${arg_PUBLIC} PRIVATE af_compile_options ${arg_PRIVATE})
+  target_link_libraries(${name} PUBLIC ${arg_USES} ${arg_PUBLIC} PRIVATE af_compile_options ${arg_PRIVATE})
   target_include_directories(${name} PUBLIC ${PROJECT_SOURCE_DIR} ${PROJECT_SOURCE_DIR}/common)
   if(arg_QUICK)
     af_compile_as(quick ${name})

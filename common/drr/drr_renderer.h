@@ -9,7 +9,7 @@
 
 #include "geometry/camera_geometry.h"
 #include "geometry/rigid_transform.h"
-#include "image/image2d.h"
+#include "xray/image2d.h"
 
 namespace af {
 

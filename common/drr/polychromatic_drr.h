@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "drr/drr_renderer.h"
-#include "spectrum/polychromatic_attenuation.h"
+#include "drr/polychromatic_attenuation.h"
 
 namespace af {
 

@@ -3,8 +3,8 @@
 
 #include <memory>
 
+#include "ct/ray_caster.h"
 #include "drr/drr_renderer.h"
-#include "volume/ray_caster.h"
 
 namespace af {
 

@@ -7,7 +7,7 @@
 
 #include "base/described_fields.h"
 #include "drr/drr_renderer.h"
-#include "spectrum/polychromatic_attenuation.h"
+#include "drr/polychromatic_attenuation.h"
 
 namespace af {
 

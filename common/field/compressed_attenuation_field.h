@@ -7,11 +7,11 @@
 #include <vector>
 
 #include "base/shared_array.h"
+#include "ct/ct_identity.h"
 #include "field/attenuation_quantizer.h"
 #include "field/codebook.h"
 #include "geometry/light_slab.h"
 #include "geometry/motion_range.h"
-#include "volume/ct_identity.h"
 
 namespace af {
 

@@ -7,8 +7,8 @@
 
 #include "base/error.h"
 #include "figures/canvas.h"
+#include "files/csv_table.h"
 #include "files/output_file.h"
-#include "text/csv_table.h"
 
 namespace af {
 

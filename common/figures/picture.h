@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "image/image2d.h"
+#include "xray/image2d.h"
 
 namespace af {
 

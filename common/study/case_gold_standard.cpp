@@ -6,9 +6,9 @@
 #include <limits>
 
 #include "base/error.h"
-#include "gold_standard/target_box.h"
-#include "gold_standard/tre.h"
-#include "text/number_json.h"
+#include "files/number_json.h"
+#include "geometry/target_box.h"
+#include "geometry/tre.h"
 
 namespace af {
 

@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "gold_standard/fiducial_registration.h"
-#include "gold_standard/gold_uncertainty.h"
+#include "geometry/fiducial_registration.h"
+#include "geometry/gold_uncertainty.h"
 #include "study/study_file.h"
 
 namespace af {

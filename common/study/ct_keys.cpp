@@ -9,8 +9,8 @@
 
 #include "base/error.h"
 #include "base/joined.h"
-#include "text/options_toml.h"
-#include "text/toml_reader.h"
+#include "files/options_toml.h"
+#include "files/toml_reader.h"
 
 namespace af {
 

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "volume/ct_read_options.h"
+#include "ct/ct_read_options.h"
 
 namespace af {
 

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
-#include "text/csv_table.h"
+#include "files/csv_table.h"
 
 namespace af {
 namespace {

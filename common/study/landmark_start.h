@@ -4,7 +4,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
-#include "gold_standard/landmark_pose.h"
+#include "geometry/landmark_pose.h"
 #include "study/study_file.h"
 
 namespace af {

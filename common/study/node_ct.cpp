@@ -8,9 +8,9 @@
 
 #include "base/error.h"
 #include "base/stored_bytes.h"
-#include "spectrum/bone_volume.h"
+#include "ct/cut_faces.h"
+#include "drr/bone_volume.h"
 #include "study/target_place.h"
-#include "volume/cut_faces.h"
 
 namespace af {
 

@@ -10,10 +10,10 @@
 #include <tuple>
 #include <vector>
 
-#include "image_files/ct_reader.h"
-#include "parallel/communicator.h"
+#include "ct/attenuation_volume.h"
+#include "ct/ct_reader.h"
+#include "ranks/communicator.h"
 #include "study/study_file.h"
-#include "volume/attenuation_volume.h"
 
 namespace af {
 

@@ -5,9 +5,9 @@
 
 #include "base/error.h"
 #include "base/joined.h"
-#include "camera_files/matrix_text.h"
+#include "files/foreign_file.h"
 #include "files/output_file.h"
-#include "text/foreign_file.h"
+#include "study/matrix_text.h"
 
 namespace af {
 

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "camera_files/rig_toml.h"
 #include "geometry/camera_geometry.h"
+#include "study/rig_toml.h"
 
 namespace af {
 

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "geometry/rigid_transform.h"
-#include "image/image2d.h"
-#include "parallel/communicator.h"
+#include "ranks/communicator.h"
 #include "study/study_file.h"
+#include "xray/image2d.h"
 
 namespace af {
 

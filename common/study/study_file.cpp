@@ -12,13 +12,13 @@
 #include "base/named_rows.h"
 #include "base/toml_text.h"
 #include "files/output_file.h"
-#include "gold_standard/fiducial_registration.h"
-#include "gold_standard/target_box.h"
+#include "files/toml_reader.h"
+#include "geometry/fiducial_registration.h"
+#include "geometry/target_box.h"
 #include "study/ct_keys.h"
 #include "study/landmark_start.h"
 #include "study/rig_file.h"
 #include "study/target_place.h"
-#include "text/toml_reader.h"
 
 namespace af {
 

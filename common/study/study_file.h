@@ -10,12 +10,12 @@
 #include <vector>
 
 #include "base/error.h"
+#include "ct/ct_read_options.h"
 #include "geometry/camera_geometry.h"
 #include "geometry/rigid_transform.h"
 #include "geometry/slab_sizing.h"
-#include "image/image2d.h"
 #include "study/xray_reading.h"
-#include "volume/ct_read_options.h"
+#include "xray/image2d.h"
 
 namespace af {
 

@@ -4,8 +4,8 @@
 #include <limits>
 
 #include "base/error.h"
-#include "text/csv_table.h"
-#include "text/toml_reader.h"
+#include "files/csv_table.h"
+#include "files/toml_reader.h"
 
 namespace af {
 namespace {

@@ -4,8 +4,8 @@
 
 #include <string>
 
+#include "ct/ct_volume.h"
 #include "study/study_file.h"
-#include "volume/ct_volume.h"
 
 namespace af {
 

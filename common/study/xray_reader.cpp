@@ -8,13 +8,13 @@
 
 #include "base/error.h"
 #include "base/number_text.h"
-#include "image/air_level.h"
-#include "image/quantile.h"
-#include "image/xray_borders.h"
-#include "image_files/dicom_xray.h"
-#include "image_files/image_file.h"
-#include "image_files/image_header.h"
+#include "images/image_header.h"
 #include "study/xray_undistortion.h"
+#include "xray/air_level.h"
+#include "xray/dicom_xray.h"
+#include "xray/image_file.h"
+#include "xray/quantile.h"
+#include "xray/xray_borders.h"
 
 namespace af {
 

@@ -5,7 +5,7 @@
 
 #include "base/named_rows.h"
 #include "base/toml_text.h"
-#include "text/toml_reader.h"
+#include "files/toml_reader.h"
 
 namespace af {
 

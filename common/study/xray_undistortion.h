@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "geometry/camera_geometry.h"
-#include "image/image2d.h"
+#include "xray/image2d.h"
 
 namespace af {
 

@@ -8,7 +8,7 @@
 
 #include "drr/drr_renderer.h"
 #include "geometry/motion_range.h"
-#include "image/psnr.h"
+#include "xray/psnr.h"
 
 namespace af::evaluation {
 

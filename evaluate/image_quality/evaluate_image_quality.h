@@ -8,9 +8,9 @@
 
 #include "cli/run_limits.h"
 #include "cli/sub_command.h"
+#include "ct/ct_reader.h"
+#include "ct/ray_caster.h"
 #include "drr/xray_beam.h"
-#include "image_files/ct_reader.h"
-#include "volume/ray_caster.h"
 
 namespace af::evaluation {
 

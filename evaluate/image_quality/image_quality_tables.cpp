@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "evaluate/outputs/sample_summary_json.h"
+#include "evaluate/report/sample_summary_json.h"
 #include "evaluate/statistics/statistics.h"
 
 namespace af::evaluation {

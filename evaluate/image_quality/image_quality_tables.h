@@ -7,8 +7,8 @@
 
 #include "evaluate/image_quality/drr_comparison.h"
 #include "field/compressed_attenuation_field.h"
+#include "files/csv_cells.h"
 #include "geometry/camera_distance.h"
-#include "text/csv_cells.h"
 
 namespace af::evaluation {
 

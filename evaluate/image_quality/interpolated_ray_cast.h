@@ -3,9 +3,9 @@
 
 #include <memory>
 
+#include "ct/ray_caster.h"
 #include "drr/drr_renderer.h"
 #include "geometry/light_slab.h"
-#include "volume/ray_caster.h"
 
 namespace af::evaluation {
 

@@ -6,9 +6,9 @@
 #include <string>
 #include <utility>
 
-#include "evaluate/outputs/sample_summary_json.h"
+#include "evaluate/report/sample_summary_json.h"
+#include "files/csv_cells.h"
 #include "files/output_file.h"
-#include "text/csv_cells.h"
 
 namespace af::evaluation {
 namespace {

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "cli/sub_command.h"
-#include "image_files/ct_reader.h"
-#include "volume/ray_caster.h"
+#include "ct/ct_reader.h"
+#include "ct/ray_caster.h"
 
 namespace af::evaluation {
 

@@ -7,16 +7,16 @@
 #include <string>
 #include <vector>
 
-#include "evaluate/methods/loaded_methods.h"
 #include "evaluate/registration/evaluate_registrations.h"
 #include "evaluate/registration/failure_traces.h"
+#include "evaluate/registration/loaded_methods.h"
 #include "evaluate/registration/registration_rows.h"
 #include "evaluate/registration/start_tables.h"
 #include "evaluate/registration/yardstick.h"
 #include "evaluate/starts/perturbed_starts.h"
-#include "parallel/communicator.h"
-#include "register/uncertainty/registrar.h"
-#include "run/run_folder.h"
+#include "ranks/communicator.h"
+#include "ranks/run_folder.h"
+#include "register/verdict/registrar.h"
 #include "study/case_gold_standard.h"
 #include "study/study_file.h"
 

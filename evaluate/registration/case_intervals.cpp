@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluate/registration/case_intervals.h"
 
-#include "text/number_json.h"
+#include "files/number_json.h"
 
 namespace af::evaluation {
 

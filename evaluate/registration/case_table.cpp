@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "evaluate/outputs/sample_summary_json.h"
-#include "text/csv_cells.h"
+#include "evaluate/report/sample_summary_json.h"
+#include "files/csv_cells.h"
 
 namespace af::evaluation {
 

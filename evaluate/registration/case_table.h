@@ -3,7 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "text/csv_table.h"
+#include "files/csv_table.h"
 
 namespace af::evaluation {
 

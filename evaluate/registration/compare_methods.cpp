@@ -2,10 +2,10 @@
 #include "evaluate/registration/compare_methods.h"
 
 #include "base/error.h"
-#include "evaluate/outputs/table_paths.h"
 #include "evaluate/registration/method_comparison.h"
 #include "evaluate/registration/pose_distances.h"
 #include "evaluate/report/report_program.h"
+#include "evaluate/report/table_paths.h"
 #include "files/output_file.h"
 
 namespace af::evaluation {

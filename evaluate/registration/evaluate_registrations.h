@@ -9,10 +9,10 @@
 
 #include "cli/run_limits.h"
 #include "cli/sub_command.h"
-#include "evaluate/methods/evaluated_methods.h"
+#include "evaluate/registration/evaluated_methods.h"
 #include "evaluate/starts/perturbed_starts.h"
 #include "evaluate/statistics/success_rate.h"
-#include "register/uncertainty/uncertainty_estimator.h"
+#include "register/verdict/uncertainty_estimator.h"
 
 namespace af::evaluation {
 

@@ -5,9 +5,9 @@
 #include <iterator>
 #include <utility>
 
+#include "files/csv_cells.h"
 #include "files/output_file.h"
-#include "gold_standard/tre.h"
-#include "text/csv_cells.h"
+#include "geometry/tre.h"
 
 namespace af::evaluation {
 

@@ -10,8 +10,8 @@
 
 #include "evaluate/registration/registration_rows.h"
 #include "evaluate/registration/yardstick.h"
+#include "files/csv_table.h"
 #include "register/method/registration.h"
-#include "text/csv_table.h"
 
 namespace af::evaluation {
 

@@ -6,7 +6,7 @@
 #include <cstdint>
 
 #include "base/error.h"
-#include "pose_files/pose_file.h"
+#include "study/pose_file.h"
 
 namespace af::evaluation {
 namespace {

@@ -9,13 +9,13 @@
 #include <Eigen/Core>
 
 #include "base/error.h"
-#include "evaluate/outputs/sample_summary_json.h"
 #include "evaluate/registration/finished_rows.h"
 #include "evaluate/registration/registration_statistics.h"
+#include "evaluate/report/sample_summary_json.h"
 #include "evaluate/starts/perturbed_starts.h"
 #include "evaluate/statistics/statistics.h"
-#include "gold_standard/target_box.h"
-#include "text/csv_cells.h"
+#include "files/csv_cells.h"
+#include "geometry/target_box.h"
 
 namespace af::evaluation {
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "evaluate/report/evaluation_run.h"
-#include "text/csv_table.h"
+#include "files/csv_table.h"
 
 namespace af::evaluation {
 

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "base/sample_summary.h"
-#include "evaluate/outputs/sample_summary_json.h"
 #include "evaluate/registration/case_intervals.h"
+#include "evaluate/report/sample_summary_json.h"
 #include "evaluate/statistics/case_equivalence.h"
 #include "evaluate/statistics/patient_names.h"
 #include "evaluate/statistics/signed_rank_test.h"

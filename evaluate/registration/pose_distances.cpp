@@ -9,10 +9,10 @@
 
 #include "evaluate/registration/finished_rows.h"
 #include "evaluate/statistics/patient_names.h"
+#include "files/csv_cells.h"
 #include "geometry/rigid_transform.h"
-#include "gold_standard/target_box.h"
-#include "gold_standard/tre.h"
-#include "text/csv_cells.h"
+#include "geometry/target_box.h"
+#include "geometry/tre.h"
 
 namespace af::evaluation {
 namespace {

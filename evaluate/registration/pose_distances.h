@@ -10,7 +10,7 @@
 #include "base/sample_summary.h"
 #include "evaluate/report/evaluation_run.h"
 #include "evaluate/statistics/case_equivalence.h"
-#include "text/csv_table.h"
+#include "files/csv_table.h"
 
 namespace af::evaluation {
 

@@ -2,7 +2,7 @@
 #include "evaluate/registration/registration_errors.h"
 
 #include "base/error.h"
-#include "gold_standard/point_distances.h"
+#include "geometry/point_distances.h"
 
 namespace af::evaluation {
 

@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "base/error.h"
+#include "files/csv_cells.h"
 #include "files/output_file.h"
-#include "text/csv_cells.h"
 
 namespace af::evaluation {
 

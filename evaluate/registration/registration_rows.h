@@ -14,8 +14,8 @@
 #include "evaluate/registration/registration_errors.h"
 #include "evaluate/starts/perturbed_starts.h"
 #include "evaluate/statistics/success_rate.h"
+#include "files/csv_table.h"
 #include "register/results/registration_columns.h"
-#include "text/csv_table.h"
 
 namespace af::evaluation {
 

@@ -12,10 +12,10 @@
 #include <tuple>
 #include <utility>
 
-#include "evaluate/outputs/sample_summary_json.h"
 #include "evaluate/registration/case_intervals.h"
 #include "evaluate/registration/success_statistics.h"
 #include "evaluate/registration/uncertainty_statistics.h"
+#include "evaluate/report/sample_summary_json.h"
 #include "evaluate/statistics/bootstrap.h"
 #include "evaluate/statistics/patient_names.h"
 

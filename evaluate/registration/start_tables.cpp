@@ -10,9 +10,9 @@
 
 #include "base/error.h"
 #include "base/joined.h"
-#include "pose_files/pose_file.h"
-#include "pose_files/project_poses.h"
-#include "text/csv_table.h"
+#include "files/csv_table.h"
+#include "study/pose_file.h"
+#include "study/project_poses.h"
 
 namespace af::evaluation {
 namespace {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "geometry/rigid_transform.h"
-#include "pose_files/pose_format.h"
+#include "study/pose_format.h"
 
 namespace af::evaluation {
 

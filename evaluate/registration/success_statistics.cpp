@@ -12,7 +12,7 @@
 #include "evaluate/registration/case_intervals.h"
 #include "evaluate/statistics/bootstrap.h"
 #include "evaluate/statistics/success_rate.h"
-#include "text/number_json.h"
+#include "files/number_json.h"
 
 namespace af::evaluation {
 

@@ -11,8 +11,8 @@
 #include "base/sample_summary.h"
 #include "evaluate/registration/case_intervals.h"
 #include "evaluate/statistics/roc.h"
-#include "register/uncertainty/pose_covariance.h"
-#include "text/number_json.h"
+#include "files/number_json.h"
+#include "register/verdict/pose_covariance.h"
 
 namespace af::evaluation {
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluate/registration/yardstick.h"
 
-#include "gold_standard/target_box.h"
-#include "gold_standard/tre.h"
+#include "geometry/target_box.h"
+#include "geometry/tre.h"
 
 namespace af::evaluation {
 

@@ -4,8 +4,8 @@
 #include <set>
 
 #include "base/error.h"
+#include "files/json_text.h"
 #include "files/output_file.h"
-#include "text/json_text.h"
 
 namespace af::evaluation {
 

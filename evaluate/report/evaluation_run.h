@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "text/csv_table.h"
+#include "files/csv_table.h"
 
 namespace af::evaluation {
 

@@ -12,8 +12,8 @@
 
 #include "base/error.h"
 #include "files/captured_output.h"
-#include "run/terminal.h"
-#include "text/shell_words.h"
+#include "files/shell_words.h"
+#include "ranks/terminal.h"
 
 extern char** environ;
 

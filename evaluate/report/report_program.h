@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "parallel/communicator.h"
+#include "ranks/communicator.h"
 
 namespace af::evaluation {
 

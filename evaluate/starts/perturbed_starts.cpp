@@ -10,7 +10,7 @@
 #include "base/error.h"
 #include "base/hash_random.h"
 #include "base/joined.h"
-#include "gold_standard/target_box.h"
+#include "geometry/target_box.h"
 
 namespace af::evaluation {
 namespace {

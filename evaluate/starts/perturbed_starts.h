@@ -11,7 +11,7 @@
 #include "base/shared_array.h"
 #include "geometry/rigid_transform.h"
 #include "geometry/slab_sizing.h"
-#include "gold_standard/tre.h"
+#include "geometry/tre.h"
 
 namespace af::evaluation {
 

@@ -10,12 +10,12 @@
 
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
-#include "field_file/field_reading.h"
+#include "field/field_reading.h"
 #include "figures/picture.h"
+#include "files/csv_cells.h"
 #include "files/output_file.h"
 #include "study/node_ct.h"
 #include "study/study_file.h"
-#include "text/csv_cells.h"
 
 namespace af::evaluation {
 namespace {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "evaluate/sweeps/field_parameter_tables.h"
-#include "parallel/communicator.h"
+#include "ranks/communicator.h"
 
 namespace af::evaluation {
 

@@ -10,20 +10,20 @@
 #include <tuple>
 
 #include "base/error.h"
-#include "evaluate/methods/loaded_methods.h"
-#include "evaluate/outputs/row_gathering.h"
-#include "evaluate/outputs/sample_summary_json.h"
+#include "evaluate/registration/loaded_methods.h"
 #include "evaluate/report/evaluation_run.h"
 #include "evaluate/report/report_program.h"
+#include "evaluate/report/row_gathering.h"
+#include "evaluate/report/sample_summary_json.h"
 #include "evaluate/sweeps/similarity_curve.h"
+#include "files/csv_cells.h"
+#include "files/options_toml.h"
 #include "files/output_file.h"
 #include "files/sha256.h"
-#include "gold_standard/target_box.h"
-#include "run/run_folder.h"
+#include "geometry/target_box.h"
+#include "ranks/run_folder.h"
 #include "study/case_gold_standard.h"
 #include "study/shared_inputs.h"
-#include "text/csv_cells.h"
-#include "text/options_toml.h"
 
 namespace af::evaluation {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "cli/run_limits.h"
 #include "cli/sub_command.h"
-#include "evaluate/methods/evaluated_methods.h"
+#include "evaluate/registration/evaluated_methods.h"
 
 namespace af::evaluation {
 

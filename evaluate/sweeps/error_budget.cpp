@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "base/error.h"
-#include "gold_standard/tre.h"
+#include "geometry/tre.h"
 
 namespace af::evaluation {
 namespace {

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <utility>
 
-#include "evaluate/outputs/sample_summary_json.h"
+#include "evaluate/report/sample_summary_json.h"
+#include "files/csv_cells.h"
 #include "files/output_file.h"
-#include "text/csv_cells.h"
 
 namespace af::evaluation {
 namespace {

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "evaluate/image_quality/drr_comparison.h"
-#include "field_file/field_file.h"
-#include "precompute/plan/precompute_options.h"
+#include "field/field_file.h"
+#include "precompute/build/precompute_options.h"
 
 namespace af::evaluation {
 

@@ -5,19 +5,19 @@
 #include <sstream>
 
 #include "base/error.h"
-#include "evaluate/outputs/sample_summary_json.h"
 #include "evaluate/registration/finished_rows.h"
 #include "evaluate/report/report_program.h"
+#include "evaluate/report/sample_summary_json.h"
 #include "evaluate/statistics/success_rate.h"
 #include "evaluate/sweeps/error_budget.h"
+#include "files/csv_cells.h"
+#include "files/options_toml.h"
 #include "files/output_file.h"
 #include "files/sha256.h"
-#include "gold_standard/target_box.h"
-#include "run/provenance.h"
+#include "geometry/target_box.h"
+#include "ranks/provenance.h"
 #include "study/case_gold_standard.h"
 #include "study/study_file.h"
-#include "text/csv_cells.h"
-#include "text/options_toml.h"
 
 namespace af::evaluation {
 namespace {

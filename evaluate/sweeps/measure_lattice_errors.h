@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "cli/sub_command.h"
-#include "evaluate/methods/evaluated_methods.h"
+#include "evaluate/registration/evaluated_methods.h"
 
 namespace af::evaluation {
 

@@ -8,7 +8,7 @@
 
 #include "cli/run_limits.h"
 #include "cli/sub_command.h"
-#include "precompute/plan/precompute_options.h"
+#include "precompute/build/precompute_options.h"
 
 namespace af::evaluation {
 

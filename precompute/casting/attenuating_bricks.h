@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "volume/attenuation_volume.h"
+#include "ct/attenuation_volume.h"
 
 namespace af {
 

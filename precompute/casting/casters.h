@@ -5,12 +5,12 @@
 #include <string>
 #include <vector>
 
+#include "ct/ray_caster.h"
 #include "field/attenuation_quantizer.h"
 #include "geometry/light_slab.h"
 #include "precompute/casting/field_caster.h"
 #include "precompute/casting/slab_aligned_volume.h"
-#include "precompute/units/unit_planner.h"
-#include "volume/ray_caster.h"
+#include "precompute/casting/unit_planner.h"
 
 namespace af {
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <span>
 
-#include "precompute/units/work_unit.h"
+#include "precompute/casting/work_unit.h"
 
 namespace af {
 

@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "ct/attenuation_volume.h"
 #include "geometry/camera_geometry.h"
-#include "volume/attenuation_volume.h"
 
 namespace af {
 

@@ -5,7 +5,7 @@
 #include "geometry/light_slab.h"
 #include "precompute/casting/field_caster.h"
 #include "precompute/casting/slab_aligned_volume.h"
-#include "precompute/units/unit_planner.h"
+#include "precompute/casting/unit_planner.h"
 
 namespace af {
 

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "ct/attenuation_volume.h"
 #include "geometry/rigid_transform.h"
-#include "volume/attenuation_volume.h"
 
 namespace af {
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "ct/ray_caster.h"
 #include "field/attenuation_quantizer.h"
 #include "geometry/light_slab.h"
 #include "precompute/casting/field_caster.h"
-#include "volume/ray_caster.h"
 
 namespace af {
 

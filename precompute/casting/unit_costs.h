@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "geometry/light_slab.h"
-#include "precompute/units/work_unit.h"
+#include "precompute/casting/work_unit.h"
 
 namespace af {
 

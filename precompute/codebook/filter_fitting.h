@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "field/codebook.h"
+#include "precompute/casting/unit_tiles.h"
 #include "precompute/codebook/nearest_codeword.h"
-#include "precompute/units/unit_tiles.h"
 
 namespace af {
 

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "field/tile.h"
+#include "precompute/casting/unit_tiles.h"
 #include "precompute/codebook/codebook_reduction.h"
-#include "precompute/units/unit_tiles.h"
 
 namespace af {
 

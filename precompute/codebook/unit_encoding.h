@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "precompute/casting/unit_tiles.h"
 #include "precompute/codebook/nearest_codeword.h"
-#include "precompute/units/unit_tiles.h"
 
 namespace af {
 

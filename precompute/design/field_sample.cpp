@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include "precompute/units/unit_planner.h"
+#include "precompute/casting/unit_planner.h"
 
 namespace af {
 

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "precompute/casting/field_caster.h"
+#include "precompute/casting/unit_tiles.h"
 #include "precompute/codebook/nearest_codeword.h"
 #include "precompute/design/probe_rays.h"
-#include "precompute/units/unit_tiles.h"
 
 namespace af {
 

@@ -7,8 +7,8 @@
 
 #include "base/error.h"
 #include "base/hash_random.h"
+#include "ct/ray_caster.h"
 #include "geometry/motion_range.h"
-#include "volume/ray_caster.h"
 
 namespace af {
 

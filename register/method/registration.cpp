@@ -9,7 +9,7 @@
 
 #include "base/error.h"
 #include "base/hash_random.h"
-#include "gold_standard/tre.h"
+#include "geometry/tre.h"
 #include "register/method/prepared_stage.h"
 #include "register/optimizer/newton_search.h"
 #include "register/problem/pose_target.h"

@@ -7,7 +7,7 @@
 #include <Eigen/Core>
 
 #include "geometry/camera_geometry.h"
-#include "image/image2d.h"
+#include "xray/image2d.h"
 
 namespace af::registration {
 

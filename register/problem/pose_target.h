@@ -6,12 +6,12 @@
 #include <span>
 #include <vector>
 
+#include "ct/ct_volume.h"
 #include "drr/drr_renderer.h"
 #include "geometry/rigid_transform.h"
 #include "geometry/slab_sizing.h"
 #include "register/optimizer/optimizer.h"
 #include "register/problem/multi_view_objective.h"
-#include "volume/ct_volume.h"
 
 namespace af::registration {
 

@@ -8,8 +8,8 @@
 
 #include "drr/drr_renderer.h"
 #include "geometry/rigid_transform.h"
-#include "image/image2d.h"
 #include "register/problem/multi_view_objective.h"
+#include "xray/image2d.h"
 
 namespace af::registration {
 

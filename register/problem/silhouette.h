@@ -11,9 +11,9 @@
 #include <Eigen/Core>
 
 #include "base/thread_pool.h"
-#include "image/image2d.h"
 #include "register/problem/multi_view_objective.h"
 #include "register/problem/registration_problem.h"
+#include "xray/image2d.h"
 
 namespace af::registration {
 

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "base/error.h"
-#include "image/gaussian_blur.h"
+#include "xray/gaussian_blur.h"
 
 namespace af::registration {
 namespace {

@@ -7,8 +7,8 @@
 
 #include "drr/drr_renderer.h"
 #include "figures/picture.h"
-#include "image/gaussian_blur.h"
-#include "image/quantile.h"
+#include "xray/gaussian_blur.h"
+#include "xray/quantile.h"
 
 namespace af::registration {
 

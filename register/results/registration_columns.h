@@ -9,10 +9,10 @@
 #include <string>
 #include <tuple>
 
+#include "files/csv_cells.h"
 #include "register/method/correction.h"
-#include "register/uncertainty/uncertainty_report.h"
+#include "register/verdict/uncertainty_report.h"
 #include "register/verdict/verdict.h"
-#include "text/csv_cells.h"
 
 namespace af::registration {
 

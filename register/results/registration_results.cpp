@@ -11,8 +11,8 @@
 #include "base/joined.h"
 #include "figures/picture.h"
 #include "files/output_file.h"
-#include "pose_files/pose_file.h"
 #include "register/problem/silhouette.h"
+#include "study/pose_file.h"
 
 namespace af::registration {
 namespace {

@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "files/csv_table.h"
+#include "ranks/provenance.h"
 #include "register/results/registration_columns.h"
-#include "register/uncertainty/registrar.h"
-#include "run/provenance.h"
-#include "text/csv_table.h"
+#include "register/verdict/registrar.h"
 
 namespace af::registration {
 

@@ -6,8 +6,8 @@
 
 #include "drr/drr_renderer.h"
 #include "files/output_file.h"
-#include "image_files/image_file.h"
-#include "pose_files/pose_file.h"
+#include "study/pose_file.h"
+#include "xray/image_file.h"
 
 namespace af::registration {
 namespace {

@@ -10,7 +10,7 @@
 #include <Eigen/Core>
 
 #include "base/described_fields.h"
-#include "image/image2d.h"
+#include "xray/image2d.h"
 
 namespace af::registration {
 

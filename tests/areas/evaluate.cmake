@@ -9,35 +9,35 @@ af_add_test(
           unit/evaluate/statistics/case_equivalence_test.cpp
           unit/evaluate/statistics/roc_test.cpp
           support/interval_coverage.cpp
-          unit/evaluate/population/population_statistics_test.cpp
+          unit/evaluate/registration/population_statistics_test.cpp
           unit/evaluate/registration/registration_errors_test.cpp
           unit/evaluate/sweeps/error_budget_test.cpp
           unit/evaluate/sweeps/lattice_errors_test.cpp
           unit/evaluate/sweeps/similarity_curve_test.cpp
           unit/evaluate/image_quality/drr_comparison_test.cpp
           unit/evaluate/image_quality/loss_split_test.cpp
-  LIBS af_evaluation)
+  LIBS af_evaluate_sweeps)
 
 af_add_test(
   evaluate_report_test
   SOURCES unit/evaluate/report/evaluation_run_test.cpp unit/evaluate/registration/evaluation_rows_test.cpp
           unit/evaluate/registration/failure_traces_test.cpp unit/evaluate/report/study_runs_test.cpp
-          unit/evaluate/population/population_tables_test.cpp
-  LIBS af_evaluation_program af_evaluation_report af_study af_run)
+          unit/evaluate/registration/population_tables_test.cpp
+  LIBS af_evaluate_sweeps af_evaluate_report af_study af_ranks)
 
-af_add_test(start_tables_test SOURCES unit/evaluate/registration/start_tables_test.cpp LIBS af_evaluation_tables)
+af_add_test(start_tables_test SOURCES unit/evaluate/registration/start_tables_test.cpp LIBS af_evaluate_registration)
 
 af_add_program_tests(
   evaluate_statistics_program_tests EACH_TEST
   SOURCES programs/evaluate_statistics_test.cpp
-  LIBS af_study af_run nlohmann_json::nlohmann_json
+  LIBS af_study af_ranks nlohmann_json::nlohmann_json
   PROGRAMS af-evaluate
   TIMEOUT 120)
 
 af_add_program_tests(
   evaluate_program_tests
   SOURCES programs/evaluate_program_test.cpp support/launched_job.cpp
-  LIBS af_registration_case af_run
+  LIBS af_register af_ranks
   PROGRAMS af-evaluate af-precompute
   LABELS programs mpi
   TIMEOUT 1800)
@@ -47,8 +47,8 @@ af_add_program_tests(
 af_add_test(
   described_options_test
   SOURCES unit/described_options_test.cpp
-  LIBS af_evaluation_program af_registration_program af_precompute_program af_drr_request af_inspection af_scan_study
-       af_simulated_study PkgConfig::tomlplusplus)
+  LIBS af_evaluate_sweeps af_register af_precompute af_tools_drr af_tools_inspect af_evaluate_scan
+       af_evaluate_simulate PkgConfig::tomlplusplus)
 
 add_test(NAME population_program COMMAND ${PROJECT_SOURCE_DIR}/tests/checks/population_program.sh
                                          ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR}/bin)

@@ -3,7 +3,7 @@
 af_add_program_tests(
   kill_matrix_tests
   SOURCES programs/kill_matrix_test.cpp support/launched_job.cpp
-  LIBS af_registration_case
+  LIBS af_register
   PROGRAMS af-evaluate af-precompute af-inspect
   LABELS programs mpi
   TIMEOUT 1800)
@@ -11,14 +11,14 @@ af_add_program_tests(
 af_add_program_tests(
   fault_tests
   SOURCES programs/faults_test.cpp support/launched_job.cpp
-  LIBS af_registration_case
+  LIBS af_register
   PROGRAMS af-precompute af-inspect stopped_rank
   LABELS programs mpi
   TIMEOUT 1800)
 af_add_program_tests(
   output_lock_tests EACH_TEST
   SOURCES programs/output_locks_test.cpp support/launched_job.cpp
-  LIBS af_registration_case af_study_contents
+  LIBS af_register af_study
   PROGRAMS af-drr af-inspect af-precompute af-register af-scan af-simulate)
 
 target_compile_definitions(fault_tests PRIVATE AF_STOPPED_RANK_PROGRAM="$<TARGET_FILE:stopped_rank>")

@@ -2,7 +2,7 @@
 # The shared library and the Python module against what the programs make of a small study.
 set(af_library_study ${CMAKE_CURRENT_BINARY_DIR}/library_study)
 add_executable(make_library_study library/make_library_study.cpp)
-target_link_libraries(make_library_study PRIVATE af_compile_options af_test_support af_registration_case)
+target_link_libraries(make_library_study PRIVATE af_compile_options af_test_support af_register)
 af_compile_as(tests make_library_study)
 add_dependencies(make_library_study af-drr af-precompute af-register)
 add_test(NAME library_study COMMAND make_library_study ${af_library_study} ${PROJECT_BINARY_DIR}/bin)

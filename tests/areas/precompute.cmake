@@ -1,26 +1,26 @@
 # SPDX-License-Identifier: Apache-2.0
 af_add_test(
   precompute_test
-  SOURCES unit/precompute/units/unit_planner_test.cpp unit/precompute/units/unit_tiles_test.cpp unit/precompute/codebook/nearest_codeword_test.cpp
+  SOURCES unit/precompute/casting/unit_planner_test.cpp unit/precompute/casting/unit_tiles_test.cpp unit/precompute/codebook/nearest_codeword_test.cpp
           unit/precompute/codebook/filter_fitting_test.cpp unit/precompute/codebook/mean_removal_test.cpp
-          unit/precompute/plan/precompute_options_test.cpp unit/precompute/casting/field_caster_test.cpp unit/precompute/casting/least_squares_caster_test.cpp unit/precompute/casting/measured_residual_test.cpp unit/precompute/codebook/codebook_training_test.cpp
-  LIBS af_precompute af_drr_core af_text)
+          unit/precompute/build/precompute_options_test.cpp unit/precompute/casting/field_caster_test.cpp unit/precompute/casting/least_squares_caster_test.cpp unit/precompute/casting/measured_residual_test.cpp unit/precompute/codebook/codebook_training_test.cpp
+  LIBS af_precompute_build af_drr af_files)
 
 af_add_test(
   field_design_test
   SOURCES unit/precompute/design/design_search_test.cpp unit/precompute/design/design_probe_test.cpp
-  LIBS af_precompute af_drr_core)
+  LIBS af_precompute_build af_drr)
 
 af_add_mpi_test(
   field_file_test
   SOURCES mpi/field_file_test.cpp
-  LIBS af_field_file af_study af_run MPI::MPI_C PkgConfig::hdf5_openmpi
+  LIBS af_field af_study af_ranks MPI::MPI_C PkgConfig::hdf5_openmpi
   RANKS 1 2 3 4)
 
 af_add_mpi_test(
   atlas_file_test
   SOURCES mpi/atlas_file_test.cpp
-  LIBS af_field_use MPI::MPI_C PkgConfig::hdf5_openmpi
+  LIBS af_drr MPI::MPI_C PkgConfig::hdf5_openmpi
   RANKS 1 2 3 4)
 
 af_add_mpi_test(
@@ -40,6 +40,13 @@ set_tests_properties(atlas_program PROPERTIES LABELS mpi TIMEOUT 900)
 af_add_program_tests(
   measured_fields_tests
   SOURCES programs/measured_fields_test.cpp
-  LIBS af_image_files af_text
+  LIBS af_xray af_files
   PROGRAMS af-simulate af-scan af-precompute af-evaluate
   TIMEOUT 600)
+
+af_add_test(
+  shear_warp_test
+  SOURCES unit/precompute/casting/attenuating_bricks_test.cpp
+          unit/precompute/casting/slab_aligned_volume_test.cpp unit/precompute/casting/shear_warp_caster_test.cpp
+          unit/precompute/casting/depth_slabs_test.cpp
+  LIBS af_precompute_build)

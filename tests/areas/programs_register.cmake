@@ -2,7 +2,7 @@
 af_add_program_tests(
   register_program_tests
   SOURCES programs/register_program_test.cpp
-  LIBS af_registration_case
+  LIBS af_register
   PROGRAMS af-register af-drr af-precompute)
 
 # docs/howto/bones.md: a simulated bone among others, and real X-rays where AF_WRIST_BIPLANE names their folder.
@@ -17,11 +17,11 @@ endforeach()
 af_add_program_tests(
   leak_tests
   SOURCES programs/leaks_test.cpp
-  LIBS af_study_contents
+  LIBS af_study
   PROGRAMS af-register af-simulate af-evaluate)
 
 af_add_program_tests(
   spectrum_program_tests
   SOURCES programs/spectrum_program_test.cpp
-  LIBS af_registration_case
+  LIBS af_register
   PROGRAMS af-register af-drr af-precompute af-evaluate)

@@ -15,18 +15,18 @@ af_add_test(
           unit/register/method/correction_test.cpp
           unit/register/method/registration_test.cpp
           unit/register/verdict/verdict_test.cpp
-          unit/register/uncertainty/pose_covariance_test.cpp
-          unit/register/uncertainty/uncertainty_estimator_test.cpp
-  LIBS af_registration af_gold_standard af_text)
+          unit/register/verdict/pose_covariance_test.cpp
+          unit/register/verdict/uncertainty_estimator_test.cpp
+  LIBS af_register_verdict af_geometry af_files)
 af_add_test(
   register_program_unit_tests
   SOURCES unit/register/register_options_test.cpp unit/register/kept_fields_test.cpp unit/register/results/registration_results_test.cpp
           unit/register/results/slicer_folder_test.cpp
-  LIBS af_registration_program)
-af_add_mpi_test(register_mpi_tests SOURCES mpi/multi_start_test.cpp LIBS af_registration_program RANKS 1 2 3 4)
+  LIBS af_register)
+af_add_mpi_test(register_mpi_tests SOURCES mpi/multi_start_test.cpp LIBS af_register RANKS 1 2 3 4)
 # Its own operator new belongs into a file of its own.
 set_source_files_properties(support/counted_allocations.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 af_add_test(
   allocation_test
   SOURCES unit/register/allocation_test.cpp unit/drr/small_fields.cpp support/counted_allocations.cpp
-  LIBS af_registration)
+  LIBS af_register_verdict)

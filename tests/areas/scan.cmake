@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 af_add_test(
   scan_test
-  SOURCES unit/scan/simulated_scan.cpp
-          unit/scan/calibration_distance.cpp
-          unit/scan/fdk_test.cpp
-          unit/scan/line_integrals_test.cpp
-          unit/scan/scan_file_test.cpp
-          unit/scan/scan_geometry_test.cpp
-          unit/scan/self_calibration_test.cpp
-  LIBS af_scan_study)
+  SOURCES unit/evaluate/scan/simulated_scan.cpp
+          unit/evaluate/scan/calibration_distance.cpp
+          unit/evaluate/scan/fdk_test.cpp
+          unit/evaluate/scan/line_integrals_test.cpp
+          unit/evaluate/scan/scan_file_test.cpp
+          unit/evaluate/scan/scan_geometry_test.cpp
+          unit/evaluate/scan/self_calibration_test.cpp
+  LIBS af_evaluate_scan)
 af_add_program_tests(
   scan_program_tests EACH_TEST
-  SOURCES programs/scan_program_test.cpp unit/scan/simulated_scan.cpp
-  LIBS af_scan_study af_study_contents
+  SOURCES programs/scan_program_test.cpp unit/evaluate/scan/simulated_scan.cpp
+  LIBS af_evaluate_scan af_study
   PROGRAMS af-scan
   TIMEOUT 300)
 target_compile_definitions(scan_program_tests

@@ -5,5 +5,10 @@ af_add_test(
   LIBS af_study)
 af_add_test(
   xray_reader_test
-  SOURCES unit/study/xray_reader_test.cpp unit/image_files/ct_test_data.cpp
-  LIBS af_study_contents)
+  SOURCES unit/study/xray_reader_test.cpp unit/ct/ct_test_data.cpp
+  LIBS af_study)
+
+af_add_test(
+  pose_files_test
+  SOURCES unit/study/pose_file_test.cpp
+  LIBS af_study)

@@ -12,8 +12,8 @@
 #include "field/attenuation_quantizer.h"
 #include "geometry/light_slab.h"
 #include "precompute/casting/slab_aligned_volume.h"
-#include "precompute/units/unit_tiles.h"
-#include "precompute/units/work_unit.h"
+#include "precompute/casting/unit_tiles.h"
+#include "precompute/casting/work_unit.h"
 
 namespace af::benchmark {
 

@@ -14,10 +14,10 @@
 #include "benchmark/plastimatch_drr.h"
 #include "cli/app_main.h"
 #include "drr/ray_cast_drr.h"
-#include "image/psnr.h"
 #include "precompute/casting/shear_warp_caster.h"
 #include "precompute/casting/trilinear_caster.h"
 #include "support/itk_comparison.h"
+#include "xray/psnr.h"
 
 namespace af::benchmark {
 

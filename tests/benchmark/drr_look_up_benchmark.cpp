@@ -13,7 +13,7 @@
 #include "drr/ray_by_ray_af_drr.h"
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
-#include "field_file/field_reading.h"
+#include "field/field_reading.h"
 
 namespace af::benchmark {
 

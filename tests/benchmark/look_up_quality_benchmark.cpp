@@ -12,14 +12,14 @@
 #include "base/hash_random.h"
 #include "benchmark/benchmark_case.h"
 #include "cli/app_main.h"
+#include "ct/blurred_volume.h"
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
-#include "field_file/field_reading.h"
-#include "image/psnr.h"
+#include "field/field_reading.h"
 #include "precompute/casting/shear_warp_caster.h"
 #include "support/central_differences.h"
 #include "support/plane_products.h"
-#include "volume/blurred_volume.h"
+#include "xray/psnr.h"
 
 namespace {
 

@@ -14,11 +14,11 @@
 #include "benchmark/benchmark_case.h"
 #include "benchmark/viewpoint_cylinder.h"
 #include "cli/app_main.h"
+#include "ct/ct_reader.h"
+#include "ct/ray_caster.h"
 #include "geometry/motion_range.h"
-#include "image/psnr.h"
-#include "image_files/ct_reader.h"
 #include "study/rig_file.h"
-#include "volume/ray_caster.h"
+#include "xray/psnr.h"
 
 namespace {
 

@@ -9,7 +9,7 @@
 #include <sstream>
 
 #include "base/error.h"
-#include "image_files/ct_reader.h"
+#include "ct/ct_reader.h"
 #include "support/run_program.h"
 
 namespace af::benchmark {

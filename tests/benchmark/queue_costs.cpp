@@ -10,9 +10,9 @@
 #include "base/stored_bytes.h"
 #include "benchmark/alternating_rounds.h"
 #include "evaluate/registration/registration_rows.h"
-#include "parallel/mpi_handle.h"
-#include "run/progress_journal.h"
-#include "run/stop_request.h"
+#include "ranks/mpi_handle.h"
+#include "ranks/progress_journal.h"
+#include "ranks/stop_request.h"
 #include "support/test_paths.h"
 
 namespace af::benchmark {

@@ -3,13 +3,13 @@
 #pragma once
 
 #include "benchmark/scale_simulation.h"
-#include "parallel/communicator.h"
+#include "ranks/communicator.h"
 
 namespace af::benchmark {
 
 /// Collective, two ranks or more. Rank 0's time for a request from seeing it to having answered it,
 /// and per row that comes with it in blocks of 64; measured between ranks 0 and 1, as
-/// parallel/work_queue.cpp does it. On rank 0 only.
+/// ranks/work_queue.cpp does it. On rank 0 only.
 void measure_messages(const Communicator& world, int repetitions, QueueCosts& costs);
 
 /// What becomes of a row of registrations: packing and appending to the rank's own shard, as

@@ -12,7 +12,7 @@
 #include "benchmark/alternating_rounds.h"
 #include "benchmark/benchmark_case.h"
 #include "cli/app_main.h"
-#include "parallel/work_queue.h"
+#include "ranks/work_queue.h"
 
 namespace af::benchmark {
 

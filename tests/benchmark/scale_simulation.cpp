@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "base/hash_random.h"
-#include "parallel/work_queue.h"
+#include "ranks/work_queue.h"
 
 namespace af::benchmark {
 

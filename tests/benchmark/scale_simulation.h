@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A discrete-event simulation of the work queue (parallel/work_queue.h) on clusters that are not at
+// A discrete-event simulation of the work queue (ranks/work_queue.h) on clusters that are not at
 // hand: the real rule for blocks, costs measured on one machine, times of items drawn.
 #pragma once
 

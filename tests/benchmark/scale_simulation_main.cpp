@@ -12,7 +12,7 @@
 #include "benchmark/benchmark_case.h"
 #include "benchmark/queue_costs.h"
 #include "cli/app_main.h"
-#include "text/csv_table.h"
+#include "files/csv_table.h"
 
 namespace {
 

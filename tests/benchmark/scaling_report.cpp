@@ -8,8 +8,8 @@
 #include "benchmark/benchmark_case.h"
 #include "benchmark/scaling_model.h"
 #include "cli/app_main.h"
+#include "files/csv_table.h"
 #include "files/output_file.h"
-#include "text/csv_table.h"
 
 namespace {
 

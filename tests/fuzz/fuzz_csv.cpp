@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "evaluate/registration/start_tables.h"
+#include "files/csv_table.h"
 #include "fuzz/fuzz_input.h"
-#include "pose_files/pose_file.h"
-#include "text/csv_table.h"
+#include "study/pose_file.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace af;

@@ -3,8 +3,8 @@
 #include <optional>
 
 #include "fuzz/fuzz_input.h"
-#include "image_files/dicom_elements.h"
-#include "image_files/dicom_pixels.h"
+#include "images/dicom_elements.h"
+#include "images/dicom_pixels.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace af;

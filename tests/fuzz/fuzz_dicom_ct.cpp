@@ -6,9 +6,9 @@
 #include <optional>
 #include <string>
 
+#include "ct/ct_reader.h"
 #include "fuzz/fuzz_input.h"
-#include "image_files/ct_reader.h"
-#include "unit/image_files/ct_test_data.h"
+#include "unit/ct/ct_test_data.h"
 
 namespace {
 

@@ -5,9 +5,9 @@
 #include <optional>
 
 #include "fuzz/fuzz_input.h"
-#include "image_files/dicom_elements.h"
-#include "image_files/dicom_xray.h"
+#include "images/dicom_elements.h"
 #include "study/xray_reader.h"
+#include "xray/dicom_xray.h"
 
 namespace {
 

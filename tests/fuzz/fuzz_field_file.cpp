@@ -8,15 +8,15 @@
 #include <memory>
 #include <utility>
 
-#include "field_file/field_layout.h"
-#include "field_file/field_reading.h"
-#include "field_file/field_writing.h"
-#include "field_file/hdf5_calls.h"
-#include "field_file/index_dataset.h"
+#include "field/field_layout.h"
+#include "field/field_reading.h"
+#include "field/field_writing.h"
+#include "field/hdf5_calls.h"
+#include "field/index_dataset.h"
 #include "files/sha256.h"
 #include "fuzz/fuzz_input.h"
 #include "fuzz/sample_field.h"
-#include "parallel/mpi_environment.h"
+#include "ranks/mpi_environment.h"
 
 namespace {
 

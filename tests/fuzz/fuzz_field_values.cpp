@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "drr/ray_by_ray_af_drr.h"
-#include "field_file/field_layout.h"
+#include "field/field_layout.h"
 #include "fuzz/fuzz_input.h"
 #include "fuzz/sample_field.h"
 

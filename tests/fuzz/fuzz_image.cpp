@@ -5,8 +5,8 @@
 
 #include "base/error.h"
 #include "fuzz/fuzz_input.h"
-#include "image_files/image_header.h"
-#include "image_files/stored_image.h"
+#include "images/image_header.h"
+#include "images/stored_image.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace af;

@@ -4,7 +4,7 @@
 #include <array>
 
 #include "fuzz/fuzz_input.h"
-#include "image_files/image_header.h"
+#include "images/image_header.h"
 #include "tools/inspect/inspection.h"
 
 namespace {

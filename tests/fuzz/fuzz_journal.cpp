@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "fuzz/fuzz_input.h"
-#include "run/progress_journal.h"
+#include "ranks/progress_journal.h"
 
 namespace {
 

@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "fuzz/fuzz_input.h"
-#include "pose_files/pose_file.h"
+#include "study/pose_file.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace af;

@@ -4,8 +4,8 @@
 #include <optional>
 
 #include "base/file_name.h"
+#include "evaluate/scan/scan_file.h"
 #include "fuzz/fuzz_input.h"
-#include "tools/scan/scan_file.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace af;

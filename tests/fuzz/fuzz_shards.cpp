@@ -10,10 +10,10 @@
 #include "base/crc32c.h"
 #include "base/stored_bytes.h"
 #include "fuzz/fuzz_input.h"
-#include "parallel/mpi_environment.h"
-#include "precompute/pipeline/field_encoder.h"
-#include "precompute/pipeline/training_journal.h"
-#include "precompute/pipeline/unit_store.h"
+#include "precompute/build/field_encoder.h"
+#include "precompute/build/training_journal.h"
+#include "precompute/build/unit_store.h"
+#include "ranks/mpi_environment.h"
 
 namespace {
 

@@ -12,16 +12,16 @@
 
 #include "base/error.h"
 #include "base/stored_bytes.h"
+#include "ct/ct_reader.h"
+#include "ct/ct_volume.h"
 #include "evaluate/registration/registration_rows.h"
 #include "files/output_file.h"
-#include "image_files/ct_reader.h"
-#include "image_files/image_file.h"
-#include "pose_files/pose_file.h"
+#include "study/pose_file.h"
 #include "study/rig_file.h"
 #include "study/study_template.h"
-#include "unit/image_files/ct_test_data.h"
-#include "unit/image_files/dicom_test_file.h"
-#include "volume/ct_volume.h"
+#include "unit/ct/ct_test_data.h"
+#include "unit/ct/dicom_test_file.h"
+#include "xray/image_file.h"
 
 namespace {
 

@@ -5,7 +5,7 @@
 
 #include "field/attenuation_atlas.h"
 #include "field/compressed_attenuation_field.h"
-#include "field_file/field_writing.h"
+#include "field/field_writing.h"
 
 namespace af::fuzz {
 

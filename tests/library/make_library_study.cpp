@@ -8,7 +8,7 @@
 #include <string>
 
 #include "drr/field_renderer.h"
-#include "field_file/field_reading.h"
+#include "field/field_reading.h"
 #include "library/library_study.h"
 #include "programs/small_study.h"
 #include "support/run_program.h"

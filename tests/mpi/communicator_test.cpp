@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "parallel/communicator.h"
+#include "ranks/communicator.h"
 
 #include <cstring>
 #include <tuple>
@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
-#include "parallel/mpi_environment.h"
+#include "ranks/mpi_environment.h"
 
 namespace af {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "precompute/pipeline/field_build.h"
+#include "precompute/build/field_build.h"
 
 #include <array>
 #include <atomic>
@@ -11,14 +11,14 @@
 #include "base/error.h"
 #include "base/stored_bytes.h"
 #include "base/vector_width.h"
-#include "field_file/field_reading.h"
-#include "parallel/values_of_ranks.h"
+#include "field/field_reading.h"
+#include "precompute/build/field_encoder.h"
+#include "precompute/build/training_journal.h"
 #include "precompute/casting/slab_aligned_volume.h"
 #include "precompute/casting/trilinear_caster.h"
 #include "precompute/casting/unit_costs.h"
-#include "precompute/pipeline/field_encoder.h"
-#include "precompute/pipeline/training_journal.h"
-#include "precompute/units/unit_planner.h"
+#include "precompute/casting/unit_planner.h"
+#include "ranks/values_of_ranks.h"
 #include "support/ct_phantoms.h"
 #include "support/shared_folder.h"
 #include "unit/precompute/casting/shear_warp_cases.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "run/resumable_items.h"
+#include "ranks/resumable_items.h"
 
 #include <array>
 #include <csignal>
@@ -12,7 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
-#include "run/stop_request.h"
+#include "ranks/stop_request.h"
 #include "support/shared_folder.h"
 
 namespace af::cli {

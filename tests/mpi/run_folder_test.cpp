@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "run/run_folder.h"
+#include "ranks/run_folder.h"
 
 #include <array>
 #include <csignal>
@@ -13,7 +13,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
-#include "run/resumable_items.h"
+#include "ranks/resumable_items.h"
 #include "support/shared_folder.h"
 
 namespace af {

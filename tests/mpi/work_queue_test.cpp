@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "parallel/work_queue.h"
+#include "ranks/work_queue.h"
 
 #include <chrono>
 #include <thread>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "parallel/work_watch.h"
+#include "ranks/work_watch.h"
 
 #include <algorithm>
 #include <array>

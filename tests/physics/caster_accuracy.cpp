@@ -6,9 +6,9 @@
 #include <random>
 #include <vector>
 
+#include "ct/ray_caster.h"
 #include "geometry/slab_sizing.h"
 #include "precompute/casting/shear_warp_caster.h"
-#include "volume/ray_caster.h"
 
 namespace af::test {
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "ct/attenuation_volume.h"
 #include "geometry/camera_geometry.h"
 #include "geometry/motion_range.h"
-#include "volume/attenuation_volume.h"
 
 namespace af::test {
 

@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <string>
 
-#include "image_files/ct_reader.h"
+#include "ct/ct_reader.h"
 #include "physics/caster_accuracy.h"
 #include "study/rig_file.h"
 

@@ -5,10 +5,10 @@
 
 #include <gtest/gtest.h>
 
-#include "image/psnr.h"
-#include "image_files/ct_reader.h"
+#include "ct/ct_reader.h"
+#include "ct/ray_caster.h"
 #include "support/itk_comparison.h"
-#include "volume/ray_caster.h"
+#include "xray/psnr.h"
 
 namespace af {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include "image_files/ct_reader.h"
+#include "ct/ct_reader.h"
 #include "physics/caster_accuracy.h"
 #include "study/rig_file.h"
 

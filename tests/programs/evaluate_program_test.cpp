@@ -16,17 +16,17 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "files/csv_table.h"
 #include "files/output_file.h"
 #include "files/output_lock.h"
-#include "pose_files/pose_file.h"
 #include "programs/small_study.h"
-#include "run/stop_request.h"
+#include "ranks/stop_request.h"
+#include "study/pose_file.h"
 #include "study/study_file.h"
 #include "support/kept_records.h"
 #include "support/launched_job.h"
 #include "support/run_program.h"
 #include "support/test_paths.h"
-#include "text/csv_table.h"
 
 namespace af {
 namespace {

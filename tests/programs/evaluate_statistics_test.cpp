@@ -12,12 +12,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "files/csv_table.h"
 #include "files/output_file.h"
 #include "study/rig_file.h"
 #include "study/study_file.h"
 #include "support/run_program.h"
 #include "support/test_paths.h"
-#include "text/csv_table.h"
 
 namespace af {
 namespace {

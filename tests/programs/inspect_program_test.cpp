@@ -12,16 +12,16 @@
 #include <gtest/gtest.h>
 
 #include "base/build_info.h"
-#include "field_file/field_reading.h"
+#include "field/field_reading.h"
+#include "files/csv_table.h"
 #include "geometry/ray_coverage.h"
-#include "pose_files/pose_file.h"
 #include "programs/small_study.h"
+#include "study/pose_file.h"
 #include "study/rig_file.h"
 #include "support/io_checks.h"
 #include "support/run_program.h"
 #include "support/test_paths.h"
-#include "text/csv_table.h"
-#include "unit/image_files/ct_test_data.h"
+#include "unit/ct/ct_test_data.h"
 
 namespace af {
 namespace {

@@ -22,6 +22,7 @@
 
 #include <gtest/gtest.h>
 
+#include "files/csv_table.h"
 #include "files/output_file.h"
 #include "programs/progress_damage.h"
 #include "programs/slow_jobs.h"
@@ -30,7 +31,6 @@
 #include "support/launched_job.h"
 #include "support/run_program.h"
 #include "support/test_paths.h"
-#include "text/csv_table.h"
 
 namespace af {
 namespace {

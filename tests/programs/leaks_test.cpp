@@ -10,12 +10,12 @@
 
 #include <gtest/gtest.h>
 
+#include "ct/ct_reader.h"
+#include "files/csv_table.h"
 #include "files/output_file.h"
-#include "image_files/ct_reader.h"
-#include "image_files/image_file.h"
 #include "support/run_program.h"
 #include "support/test_paths.h"
-#include "text/csv_table.h"
+#include "xray/image_file.h"
 
 namespace af {
 namespace {

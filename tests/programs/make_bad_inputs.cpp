@@ -12,8 +12,8 @@
 
 #include "base/hash_random.h"
 #include "programs/small_study.h"
-#include "unit/image_files/ct_test_data.h"
-#include "unit/image_files/encoded_frames.h"
+#include "unit/ct/ct_test_data.h"
+#include "unit/ct/encoded_frames.h"
 
 namespace {
 

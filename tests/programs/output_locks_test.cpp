@@ -13,8 +13,8 @@
 
 #include "files/output_file.h"
 #include "files/output_lock.h"
-#include "pose_files/pose_file.h"
 #include "programs/small_study.h"
+#include "study/pose_file.h"
 #include "support/launched_job.h"
 #include "support/run_program.h"
 #include "support/test_paths.h"

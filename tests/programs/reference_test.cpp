@@ -8,8 +8,8 @@
 
 #include <gtest/gtest.h>
 
-#include "field_file/field_layout.h"
-#include "field_file/field_writing.h"
+#include "field/field_layout.h"
+#include "field/field_writing.h"
 #include "files/output_file.h"
 #include "register/results/registration_columns.h"
 #include "register/results/registration_results.h"

@@ -10,15 +10,15 @@
 
 #include <gtest/gtest.h>
 
-#include "gold_standard/target_box.h"
-#include "gold_standard/tre.h"
-#include "image_files/image_file.h"
-#include "pose_files/pose_file.h"
+#include "files/csv_table.h"
+#include "geometry/target_box.h"
+#include "geometry/tre.h"
 #include "programs/small_study.h"
+#include "study/pose_file.h"
 #include "study/rig_file.h"
 #include "support/run_program.h"
 #include "support/test_paths.h"
-#include "text/csv_table.h"
+#include "xray/image_file.h"
 
 namespace af {
 namespace {

@@ -9,16 +9,16 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "ct/ct_reader.h"
+#include "evaluate/scan/scan_reading.h"
+#include "files/csv_table.h"
 #include "files/output_file.h"
-#include "image_files/ct_reader.h"
-#include "image_files/image_file.h"
 #include "study/study_file.h"
 #include "study/xray_reader.h"
 #include "support/run_program.h"
 #include "support/test_paths.h"
-#include "text/csv_table.h"
-#include "tools/scan/scan_reading.h"
-#include "unit/scan/simulated_scan.h"
+#include "unit/evaluate/scan/simulated_scan.h"
+#include "xray/image_file.h"
 
 namespace af {
 namespace {

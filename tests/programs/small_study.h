@@ -3,12 +3,12 @@
 
 #include <filesystem>
 
+#include "ct/ct_reader.h"
 #include "files/output_file.h"
-#include "image_files/ct_reader.h"
-#include "image_files/image_file.h"
 #include "study/rig_file.h"
 #include "study/study_file.h"
 #include "unit/register/method/registration_cases.h"
+#include "xray/image_file.h"
 
 namespace af::test {
 

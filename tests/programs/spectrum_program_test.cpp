@@ -12,14 +12,14 @@
 
 #include "drr/field_renderer.h"
 #include "drr/field_set_drr.h"
+#include "drr/opened_field.h"
 #include "drr/xray_beam.h"
-#include "field_use/opened_field.h"
-#include "image_files/image_file.h"
-#include "pose_files/pose_file.h"
 #include "programs/small_study.h"
+#include "study/pose_file.h"
 #include "support/ct_phantoms.h"
 #include "support/run_program.h"
 #include "support/test_paths.h"
+#include "xray/image_file.h"
 
 namespace af {
 namespace {

@@ -9,7 +9,7 @@
 #include "geometry/light_slab.h"
 #include "precompute/casting/field_caster.h"
 #include "precompute/casting/shear_warp_caster.h"
-#include "precompute/units/unit_planner.h"
+#include "precompute/casting/unit_planner.h"
 
 namespace af {
 

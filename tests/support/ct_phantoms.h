@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "volume/ct_volume.h"
+#include "ct/ct_volume.h"
 
 namespace af {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "volume/ct_volume.h"
+#include "ct/ct_volume.h"
 
 namespace af::test {
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "ct/ray_caster.h"
 #include "support/itk_ray_cast.h"
-#include "volume/ray_caster.h"
 
 namespace af::test {
 

@@ -6,8 +6,8 @@
 
 #include <gtest/gtest.h>
 
-#include "parallel/communicator.h"
-#include "parallel/mpi_environment.h"
+#include "ranks/communicator.h"
+#include "ranks/mpi_environment.h"
 
 namespace {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <system_error>
 
-#include "parallel/communicator.h"
+#include "ranks/communicator.h"
 #include "support/test_paths.h"
 
 namespace af::test {

@@ -14,7 +14,7 @@
 #include "base/number_text.h"
 #include "base/parsed_number.h"
 #include "base/vector_width.h"
-#include "run/progress_printer.h"
+#include "ranks/progress_printer.h"
 
 namespace af {
 namespace {

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "cli/app_main.h"
-#include "text/shell_words.h"
+#include "files/shell_words.h"
 
 namespace af::cli {
 namespace {

@@ -6,15 +6,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "ct/blurred_volume.h"
+#include "drr/bone_volume.h"
 #include "drr/field_renderer.h"
+#include "drr/material_tables.h"
 #include "drr/ray_cast_drr.h"
-#include "spectrum/bone_volume.h"
-#include "spectrum/material_tables.h"
 #include "support/central_differences.h"
 #include "support/ct_phantoms.h"
 #include "support/cube_grid.h"
 #include "unit/drr/small_fields.h"
-#include "volume/blurred_volume.h"
 
 namespace af {
 namespace {

@@ -4,11 +4,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "ct/blurred_volume.h"
 #include "support/central_differences.h"
 #include "support/ct_phantoms.h"
 #include "support/cube_grid.h"
 #include "unit/drr/small_fields.h"
-#include "volume/blurred_volume.h"
 
 namespace af {
 namespace {

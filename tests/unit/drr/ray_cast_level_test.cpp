@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "ct/blurred_volume.h"
 #include "drr/field_level.h"
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
@@ -14,7 +15,6 @@
 #include "support/cube_grid.h"
 #include "support/plane_products.h"
 #include "unit/drr/small_fields.h"
-#include "volume/blurred_volume.h"
 
 namespace af {
 namespace {

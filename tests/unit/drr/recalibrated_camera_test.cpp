@@ -13,11 +13,11 @@
 #include "geometry/camera_distance.h"
 #include "geometry/ray_coverage.h"
 #include "geometry/slab_sizing.h"
-#include "image/psnr.h"
 #include "support/c_arm_camera.h"
 #include "support/ct_phantoms.h"
 #include "support/cube_grid.h"
 #include "unit/drr/small_fields.h"
+#include "xray/psnr.h"
 
 namespace af {
 namespace {

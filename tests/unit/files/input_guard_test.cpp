@@ -8,10 +8,10 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "files/csv_table.h"
 #include "files/output_file.h"
 #include "files/partial_folder.h"
 #include "support/io_checks.h"
-#include "text/csv_table.h"
 
 namespace af {
 namespace {

@@ -7,9 +7,9 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "files/options_toml.h"
 #include "register/registration_run.h"
 #include "support/test_paths.h"
-#include "text/options_toml.h"
 
 namespace af::registration {
 namespace {

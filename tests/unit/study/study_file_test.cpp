@@ -8,13 +8,13 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "files/options_toml.h"
 #include "study/ct_keys.h"
 #include "study/landmark_start.h"
 #include "study/rig_file.h"
 #include "study/study_template.h"
 #include "study/target_place.h"
 #include "support/io_checks.h"
-#include "text/options_toml.h"
 
 namespace af {
 namespace {

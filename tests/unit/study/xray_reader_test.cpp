@@ -12,12 +12,12 @@
 #include "base/error.h"
 #include "base/hash_random.h"
 #include "geometry/pinhole_camera.h"
-#include "image_files/dicom_xray.h"
-#include "image_files/image_file.h"
 #include "support/io_checks.h"
 #include "support/test_paths.h"
-#include "unit/image_files/ct_test_data.h"
-#include "unit/image_files/encoded_frames.h"
+#include "unit/ct/ct_test_data.h"
+#include "unit/ct/encoded_frames.h"
+#include "xray/dicom_xray.h"
+#include "xray/image_file.h"
 
 namespace af {
 namespace {

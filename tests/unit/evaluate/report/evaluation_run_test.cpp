@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
-#include "evaluate/outputs/sample_summary_json.h"
+#include "evaluate/report/sample_summary_json.h"
 #include "files/output_file.h"
 #include "support/test_paths.h"
 

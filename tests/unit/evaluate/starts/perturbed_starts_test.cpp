@@ -14,8 +14,8 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
-#include "gold_standard/target_box.h"
-#include "gold_standard/tre.h"
+#include "geometry/target_box.h"
+#include "geometry/tre.h"
 #include "support/start_frame.h"
 
 namespace af::evaluation {

@@ -7,7 +7,7 @@
 #include "geometry/slab_sizing.h"
 #include "precompute/casting/trilinear_caster.h"
 #include "precompute/casting/unit_costs.h"
-#include "precompute/units/unit_planner.h"
+#include "precompute/casting/unit_planner.h"
 #include "support/cast_plan.h"
 #include "support/ct_phantoms.h"
 

@@ -9,7 +9,7 @@
 #include "base/hash_random.h"
 #include "precompute/casting/corrected_caster.h"
 #include "precompute/casting/trilinear_caster.h"
-#include "precompute/units/unit_planner.h"
+#include "precompute/casting/unit_planner.h"
 #include "support/ct_phantoms.h"
 
 namespace af {

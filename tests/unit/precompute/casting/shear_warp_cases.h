@@ -9,8 +9,8 @@
 #include <numbers>
 #include <vector>
 
+#include "ct/ct_volume.h"
 #include "geometry/light_slab.h"
-#include "volume/ct_volume.h"
 
 namespace af::test {
 

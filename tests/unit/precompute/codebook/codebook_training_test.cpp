@@ -12,10 +12,10 @@
 #include "base/error.h"
 #include "base/hash_random.h"
 #include "base/vector_width.h"
+#include "precompute/casting/unit_planner.h"
 #include "precompute/codebook/mean_removal.h"
 #include "precompute/codebook/nearest_codeword.h"
 #include "precompute/codebook/tile_drawing.h"
-#include "precompute/units/unit_planner.h"
 #include "unit/precompute/codebook/selected_tiles.h"
 
 namespace af {

@@ -9,15 +9,15 @@
 #include "base/hash_random.h"
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
-#include "image/psnr.h"
+#include "precompute/casting/unit_planner.h"
 #include "precompute/codebook/codebook_training.h"
 #include "precompute/codebook/unit_encoding.h"
 #include "precompute/design/patch_nodes.h"
-#include "precompute/units/unit_planner.h"
 #include "support/c_arm_camera.h"
 #include "support/ct_phantoms.h"
 #include "support/cube_grid.h"
 #include "unit/precompute/codebook/selected_tiles.h"
+#include "xray/psnr.h"
 
 namespace af {
 namespace {

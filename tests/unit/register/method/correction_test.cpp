@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
-#include "gold_standard/tre.h"
+#include "geometry/tre.h"
 #include "register/method/presets.h"
 #include "register/method/registration.h"
 #include "unit/register/method/narrow_drr.h"

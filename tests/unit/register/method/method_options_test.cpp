@@ -6,9 +6,9 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "files/options_toml.h"
 #include "register/method/presets.h"
 #include "register/verdict/verdict.h"
-#include "text/options_toml.h"
 
 namespace af::registration {
 namespace {

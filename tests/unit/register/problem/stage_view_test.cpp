@@ -4,8 +4,8 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
-#include "image/gaussian_blur.h"
 #include "unit/register/method/registration_cases.h"
+#include "xray/gaussian_blur.h"
 
 namespace af::registration {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "base/error.h"
 #include "files/output_file.h"
-#include "pose_files/pose_file.h"
+#include "study/pose_file.h"
 #include "support/test_paths.h"
 #include "unit/register/method/registration_cases.h"
 

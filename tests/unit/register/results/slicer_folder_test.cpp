@@ -8,11 +8,11 @@
 #include <gtest/gtest.h>
 
 #include "files/output_file.h"
-#include "image_files/image_file.h"
-#include "image_files/image_header.h"
-#include "pose_files/pose_file.h"
+#include "images/image_header.h"
+#include "study/pose_file.h"
 #include "support/test_paths.h"
 #include "unit/register/method/registration_cases.h"
+#include "xray/image_file.h"
 
 namespace af::registration {
 namespace {

@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "base/hash_random.h"
-#include "image/image2d.h"
+#include "xray/image2d.h"
 
 namespace af::test {
 

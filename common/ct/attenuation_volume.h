@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "base/described_fields.h"
+#include "ct/ct_volume.h"
+
+namespace af {
+
+/// HU to linear attenuation: mu = mu_water * max(0, 1 + HU/1000), and HU < air_below_hu counts as
+/// 0.
+struct AttenuationModel {
+  double mu_water_per_mm = 0.0200;
+  int air_below_hu = -900;
+
+  /// mu in units of mu_water / 1000: an exact integer: 0, or 1000 + air_below_hu to 33767.
+  [[nodiscard]] std::uint16_t relative_attenuation(std::int16_t hu) const {
+    return hu < air_below_hu || hu < -1000 ? std::uint16_t{0}
+                                           : static_cast<std::uint16_t>(1000 + hu);
+  }
+  [[nodiscard]] double mu_per_mm_per_unit() const { return mu_water_per_mm / 1000.0; }
+
+  void describe(Fields& field);
+};
+
+std::vector<std::string> problems(const AttenuationModel& model);
+
+/// InputError when a grid has 2^31 voxels or more: casters could not address them.
+void require_castable(const CtGrid& bordered_grid);
+
+/// The attenuating part of a CT, ready for casting: integers in units of mu_water/1000, so the HU
+/// model is exact; cropped to the box of voxels that attenuate and surrounded by a border of one
+/// zero voxel, so that trilinear interpolation falls to zero over one voxel and never needs a
+/// bounds check. Memory: 2 bytes per voxel. A volume with no attenuating voxel throws InputError.
+class AttenuationVolume {
+ public:
+  AttenuationVolume(const CtVolume& ct, const AttenuationModel& model);
+  /// Voxels that already exist (memory shared by the ranks of a node), laid out as voxels() of an
+  /// equal volume.
+  AttenuationVolume(const CtGrid& bordered_grid,
+                    const AttenuationModel& model,
+                    SharedArray<std::uint16_t> voxels);
+
+  /// The voxels of the volume that is made from a CT, into memory for bordered_grid.voxel_count()
+  /// of them.
+  static void fill_voxels(const CtVolume& ct,
+                          const AttenuationModel& model,
+                          const CtGrid& bordered_grid,
+                          std::span<std::uint16_t> voxels);
+
+  /// Grid with border: voxel (0, 0, 0) is a border voxel.
+  [[nodiscard]] const CtGrid& grid() const { return grid_; }
+  [[nodiscard]] const AttenuationModel& model() const { return model_; }
+  [[nodiscard]] std::span<const std::uint16_t> voxels() const { return voxels_.view(); }
+  /// Largest mu in the volume, 1/mm.
+  [[nodiscard]] double max_mu_per_mm() const { return max_mu_per_mm_; }
+  /// Corners (ct frame, mm) outside which interpolated attenuation is exactly 0: the centres of the
+  /// border's corner voxels.
+  [[nodiscard]] std::array<Eigen::Vector3d, 8> corner_points() const;
+  /// An upper bound of any line integral: largest mu times the diagonal.
+  [[nodiscard]] double max_total_attenuation() const;
+
+ private:
+  CtGrid grid_;
+  AttenuationModel model_;
+  SharedArray<std::uint16_t> voxels_;
+  double max_mu_per_mm_ = 0.0;
+};
+
+/// The voxels of a CT that attenuate lie within these indices, inclusive.
+struct AttenuatingBox {
+  std::array<int, 3> low;
+  std::array<int, 3> high;
+};
+
+/// The smallest such box; one pass over the CT. InputError when no voxel attenuates.
+AttenuatingBox attenuating_box(const CtVolume& ct, const AttenuationModel& model);
+
+/// Grid with border of the AttenuationVolume of a CT with that box.
+CtGrid bordered_grid(const CtGrid& ct_grid, const AttenuatingBox& box);
+
+}  // namespace af

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "ranks/communicator.h"
+
+namespace af {
+
+/// Information for the person at the terminal, on standard error, from rank 0 only. Results go to
+/// standard output.
+void inform(const Communicator& communicator, const std::string& message);
+void warn(const Communicator& communicator, const std::string& message);
+
+}  // namespace af

@@ -1,0 +1,285 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ranks/work_watch.h"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <exception>
+#include <limits>
+#include <mutex>
+#include <new>
+#include <span>
+#include <sstream>
+#include <string_view>
+#include <unistd.h>
+#include <utility>
+
+#include "base/host_name.h"
+
+namespace af {
+
+namespace {
+
+/// Written and read letter by letter, without a lock. It serves messages only, so a text that is
+/// half old and half new does no harm.
+class SharedText {
+ public:
+  void set(std::string_view text) {
+    const std::size_t size = std::min(text.size(), letters_.size());
+    for (std::size_t i = 0; i < size; ++i) letters_[i].store(text[i], std::memory_order_relaxed);
+    if (size < letters_.size()) letters_[size].store('\0', std::memory_order_relaxed);
+  }
+  [[nodiscard]] std::string get() const {
+    std::string text;
+    for (const std::atomic<char>& letter : letters_) {
+      const char read = letter.load(std::memory_order_relaxed);
+      if (read == '\0') break;
+      text.push_back(read);
+    }
+    return text;
+  }
+
+ private:
+  std::array<std::atomic<char>, 255> letters_{};
+};
+
+/// What one rank is doing, seen by the others of its host.
+struct RankNote {
+  std::atomic<std::int64_t> since_ns = 0;        ///< the last progress; 0: nothing in work
+  std::atomic<std::int64_t> limit_ns = 0;        ///< of what is in work; 0: the watchdog's own
+  std::atomic<std::int64_t> waits_since_ns = 0;  ///< in a call that waits for others; 0: not
+  std::atomic<std::int64_t> ticked_ns = 0;       ///< when its own watchdog last ran; 0: not watched
+  std::int32_t rank = 0;
+  std::int32_t process = 0;
+  std::atomic<bool> has_reported = false;  ///< of the first rank of a host: why the job ends
+  SharedText what;
+};
+static_assert(std::atomic<std::int64_t>::is_always_lock_free, "shared between processes");
+static_assert(std::atomic<char>::is_always_lock_free, "shared between processes");
+
+RankNote own_note;
+std::atomic<RankNote*> my_note = &own_note;
+std::atomic<RankNote*> first_note = &own_note;  ///< of this host
+std::mutex text_mutex;                          ///< rank 0 computes in a second thread
+std::string text_now;
+thread_local std::string failed_unit;
+
+/// The same clock in all processes of a host.
+std::int64_t now_ns() {
+  return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
+}
+
+/// Replaces the text; returns the one before.
+std::string set_text(const std::string& what) {
+  RankNote& note = *my_note;
+  const std::scoped_lock lock(text_mutex);
+  note.what.set(what);
+  note.since_ns = what.empty() ? 0 : now_ns();
+  return std::exchange(text_now, what);
+}
+
+constexpr double kNsPerMinute = 60e9;
+
+// In limits. A thread of a busy machine may be late, but not by as much as this. And when no rank
+// of a host works, the host of the stuck rank has had the time to report it.
+constexpr std::int64_t kPatienceWithStopped = 2;
+constexpr std::int64_t kPatienceWithHosts = 3;
+
+/// Of more than a year, a year.
+std::int64_t nanoseconds_of(double minutes) {
+  constexpr double kMinutesPerYear = 525600.0;
+  return static_cast<std::int64_t>(std::min(minutes, kMinutesPerYear) * kNsPerMinute);
+}
+
+std::string minutes_text(std::int64_t ns) {
+  std::ostringstream text;
+  text.precision(3);
+  text << static_cast<double>(ns) / kNsPerMinute << " min";
+  return text.str();
+}
+
+}  // namespace
+
+WorkNote::WorkNote(const std::string& what, Kind kind, double limit_minutes)
+    : what_(what),
+      kind_(kind),
+      exceptions_(std::uncaught_exceptions()),
+      limit_before_ns_((*my_note).limit_ns),
+      limit_is_of_outer_(limit_before_ns_ != 0 && limit_minutes == 0.0) {
+  failed_unit.clear();
+  before_ = set_text(what);
+  if (limit_is_of_outer_)
+    set_text(before_ + ": " + what);
+  else
+    (*my_note).limit_ns = nanoseconds_of(limit_minutes);
+}
+
+WorkNote::~WorkNote() {
+  const bool is_leaving_by_exception = std::uncaught_exceptions() > exceptions_;
+  if (!is_leaving_by_exception)
+    failed_unit.clear();
+  else if (kind_ == Kind::Unit && failed_unit.empty())
+    failed_unit = what_;
+  set_text(before_);
+  (*my_note).limit_ns = limit_before_ns_;
+}
+
+void WorkNote::change(const std::string& what) {
+  what_ = what;
+  set_text(limit_is_of_outer_ ? before_ + ": " + what : what);
+}
+
+void note_progress() {
+  RankNote& note = *my_note;
+  std::int64_t since_ns = note.since_ns;
+  // Another thread may end the work meanwhile; then it must not begin again.
+  while (since_ns != 0 && !note.since_ns.compare_exchange_weak(since_ns, now_ns())) {
+  }
+}
+
+WaitNote::WaitNote() : before_((*my_note).waits_since_ns) {
+  if (before_ == 0) (*my_note).waits_since_ns = now_ns();
+}
+
+WaitNote::~WaitNote() {
+  note_progress();  // first: a rank that waits no more must not look as if it had worked since
+  (*my_note).waits_since_ns = before_;
+}
+
+std::string take_failed_unit() {
+  return std::exchange(failed_unit, {});
+}
+
+bool claim_report() {
+  return !(*first_note).has_reported.exchange(true);
+}
+
+/// The notes of the ranks of this host.
+struct StallWatch::Board {
+  std::shared_ptr<const std::byte> memory;
+  std::span<RankNote> notes;
+};
+
+struct StallWatch::Stuck {
+  const RankNote* note;
+  std::int64_t ns;
+  bool is_stopped;
+};
+
+WaitAlarm::WaitAlarm(double limit_minutes, std::function<void()> on_end)
+    : thread_([this, limit_minutes, on_end = std::move(on_end)] {
+        constexpr std::chrono::milliseconds kTick(10);
+        const std::int64_t ticks = nanoseconds_of(limit_minutes) / 10'000'000 + 1;
+        for (std::int64_t i = 0; i < ticks; ++i) {
+          if (is_over_) return;
+          std::this_thread::sleep_for(kTick);
+        }
+        if (!is_over_) on_end();
+      }) {}
+
+WaitAlarm::~WaitAlarm() {
+  is_over_ = true;
+  thread_.join();
+}
+
+StallWatch::StallWatch(const Communicator& communicator, double limit_minutes, OnStall on_stall)
+    : board_(std::make_unique<Board>()),
+      limit_ns_(nanoseconds_of(limit_minutes)),
+      on_stall_(std::move(on_stall)) {
+  const Communicator node = communicator.node();
+  const auto ranks = static_cast<std::size_t>(node.size());
+  RankNote* notes = nullptr;
+  board_->memory = communicator.allocate_on_node_together(
+      ranks * sizeof(RankNote), [&](std::span<std::byte> bytes, int part, int) {
+        notes = reinterpret_cast<RankNote*>(bytes.data());
+        auto* const mine = new (notes + part) RankNote;
+        mine->rank = communicator.rank();
+        mine->process = getpid();
+      });
+  board_->notes = {notes, ranks};
+  my_note = notes + node.rank();
+  first_note = notes;
+  set_text(set_text({}));
+  (*my_note).ticked_ns = now_ns();
+  thread_ = std::thread([this] { watch(); });
+}
+
+StallWatch::~StallWatch() {
+  is_over_ = true;
+  thread_.join();
+  my_note = &own_note;
+  first_note = &own_note;
+}
+
+void StallWatch::watch() {
+  constexpr std::int64_t kShortestTickNs = 10'000'000;
+  constexpr std::int64_t kLongestTickNs = 200'000'000;  // a program that ends waits so long
+  const std::int64_t tick_ns = std::clamp(limit_ns_ / 20, kShortestTickNs, kLongestTickNs);
+  std::int64_t last_tick_ns = now_ns();
+  std::int64_t watched_since_ns = last_tick_ns;
+  while (!is_over_) {
+    std::this_thread::sleep_for(std::chrono::nanoseconds(tick_ns));
+    const std::int64_t tick = now_ns();
+    // A batch system may stop and continue whole jobs: that time does not count.
+    if (tick - last_tick_ns > limit_ns_ / 2) watched_since_ns = tick;
+    last_tick_ns = tick;
+    (*my_note).ticked_ns = tick;
+    const std::string text = stall_text(tick, watched_since_ns);
+    if (!text.empty() && claim_report()) on_stall_(text);
+  }
+  (*my_note).ticked_ns = 0;
+}
+
+// `now` is the time of the tick. A later reading would count time for which the job was stopped in
+// between.
+
+/// The rank that has been stuck for longest: busy with one thing for too long without waiting, or
+/// not running at all (stopped), wherever it was then.
+std::optional<StallWatch::Stuck> StallWatch::longest_stuck(std::int64_t now,
+                                                           std::int64_t watched_since_ns) const {
+  const auto age_of = [&](std::int64_t since_ns) {
+    return since_ns == 0 ? 0 : now - std::max(since_ns, watched_since_ns);
+  };
+  std::optional<Stuck> longest;
+  for (const RankNote& note : board_->notes) {
+    const std::int64_t own_limit = note.limit_ns;
+    const std::int64_t limit = own_limit == 0 ? limit_ns_ : std::min(own_limit, limit_ns_);
+    // A waiting rank is not stuck. A busy machine makes a thread wait, too, but not for as long as
+    // this.
+    const std::int64_t works_ns = note.waits_since_ns != 0 ? 0 : age_of(note.since_ns);
+    const std::int64_t still_ns = age_of(note.ticked_ns);
+    const bool is_stopped = still_ns > kPatienceWithStopped * limit_ns_;
+    if (works_ns <= limit && !is_stopped) continue;
+    const std::int64_t ns = is_stopped ? still_ns : works_ns;
+    if (!longest || ns > longest->ns) longest = Stuck{&note, ns, is_stopped};
+  }
+  return longest;
+}
+
+/// For how long all ranks of this host have been waiting for others; 0 when one of them works.
+std::int64_t StallWatch::all_wait_ns(std::int64_t now, std::int64_t watched_since_ns) const {
+  std::int64_t shortest = std::numeric_limits<std::int64_t>::max();
+  for (const RankNote& note : board_->notes) {
+    const std::int64_t since = note.waits_since_ns;
+    shortest = std::min(shortest, since == 0 ? 0 : now - std::max(since, watched_since_ns));
+  }
+  return shortest;
+}
+
+std::string StallWatch::stall_text(std::int64_t now, std::int64_t watched_since_ns) const {
+  const auto at = [](const RankNote& note) {
+    const std::string what = note.what.get();
+    return what.empty() ? what : ": " + what;
+  };
+  if (const std::optional<Stuck> stuck = longest_stuck(now, watched_since_ns))
+    return "rank " + std::to_string(stuck->note->rank) + " on " + host_name() + " (process " +
+           std::to_string(stuck->note->process) + ")" + at(*stuck->note) +
+           (stuck->is_stopped ? ": is stopped: has not run for " : ": no progress for ") +
+           minutes_text(stuck->ns);
+  const std::int64_t waited_ns = all_wait_ns(now, watched_since_ns);
+  if (waited_ns <= kPatienceWithHosts * limit_ns_) return {};
+  return "all ranks on " + host_name() + at(board_->notes[0]) + ": waiting for others for " +
+         minutes_text(waited_ns);
+}
+
+}  // namespace af

@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "xray/image2d.h"
+
+namespace af {
+
+/// Gaussian smoothing with standard deviation `sigma_px`, kernel cut at 4 sigma and normalised to
+/// sum 1, edges replicated. sigma_px <= 0 returns the image unchanged.
+Image2d gaussian_blur(const Image2d& image, double sigma_px);
+
+}  // namespace af

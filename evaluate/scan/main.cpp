@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// af-scan: a registration study of real X-rays, whose true pose is known, from a circular scan.
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "cli/app_main.h"
+#include "cli/bind_options.h"
+#include "evaluate/scan/scan_run.h"
+
+// Outside app_main only the declaration of options can throw, which is a defect of this program.
+// NOLINTNEXTLINE(bugprone-exception-escape)
+int main(int argc, char** argv) {
+  using namespace af;
+  tools::ScanOptions options;
+  CLI::App app{
+      "Makes a registration study of real X-rays from a circular cone-beam scan: finds the true "
+      "geometry from the even views, reconstructs a CT from them, and takes odd views as X-rays. "
+      "The true pose of every X-ray is the identity; the odd views show how accurate that is."};
+  cli::bind_options(app, options);
+  const std::string command_line = cli::command_line(argc, argv);
+  return cli::app_main(app, argc, argv, [&](const Communicator& world) {
+    tools::run_scan(options, command_line, world);
+  });
+}

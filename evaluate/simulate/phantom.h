@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "evaluate/simulate/phantom_parts.h"
+
+namespace af {
+
+/// Names of the phantoms, and one line that explains them.
+std::vector<std::string> phantom_names();
+std::string phantom_help();
+
+/// A phantom by its name; InputError for any other. With a seed, the patient of that number instead
+/// of the typical adult.
+Phantom make_phantom(const std::string& name,
+                     bool has_metal,
+                     std::optional<std::int64_t> anatomy_seed = {});
+
+}  // namespace af

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "ct/ct_volume.h"
+#include "geometry/slab_sizing.h"
+
+namespace af {
+
+/// These do not fold space: the slopes of wave and ramp add up to less than 1.
+struct SmoothMotionOptions {
+  double amplitude_mm = 6.0;     ///< largest displacement along each axis
+  double wavelength_mm = 160.0;  ///< of the displacement
+  double margin_mm = 5.0;        ///< around the target box that stays still, too
+  double ramp_mm = 40.0;         ///< from still to full displacement
+  int threads = 0;               ///< 0: as many as the hardware has; voxels do not depend on it
+};
+
+/// A smooth displacement of the ct frame that is zero in and near a box: breathing, say, around a
+/// vertebra that keeps its place. Along each axis a plane wave of drawn direction and phase, times
+/// a ramp over the distance from the box whose slope and curvature are continuous.
+class SmoothMotion {
+ public:
+  /// Waves are keyed by (seed, key).
+  SmoothMotion(const CtBox& still_box_ct,
+               const SmoothMotionOptions& options,
+               std::uint64_t seed,
+               std::uint64_t key);
+
+  /// Displacement (ct, mm) at a point. \test SmoothMotion.VanishesInTheTargetBoxAndItsMargin
+  [[nodiscard]] Eigen::Vector3d displacement_mm(const Eigen::Vector3d& ct_point_mm) const;
+
+  /// No displacement is longer.
+  [[nodiscard]] double largest_mm() const;
+
+  /// The anatomy that shows at x what `ct` has at x + displacement(x), trilinear, edges
+  /// replicated. Voxels without displacement keep their value.
+  [[nodiscard]] CtVolume moved(const CtVolume& ct) const;
+
+ private:
+  [[nodiscard]] double ramp(const Eigen::Vector3d& ct_point_mm) const;
+
+  CtBox still_box_ct_;
+  SmoothMotionOptions options_;
+  std::array<Eigen::Vector3d, 3> wave_vectors_per_mm_;  ///< rad per mm
+  Eigen::Vector3d phases_rad_;
+};
+
+}  // namespace af

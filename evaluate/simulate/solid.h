@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "ct/ct_volume.h"
+#include "geometry/slab_sizing.h"
+
+namespace af {
+
+/// A body of constant HU with an optional texture, in the ct frame (mm); later bodies replace
+/// earlier ones where they overlap.
+struct Solid {
+  enum class Shape {
+    Ellipsoid,
+    HalfEllipsoid,     ///< the half of an ellipsoid at positive z of the body
+    EllipticCylinder,  ///< axis along the body's z; narrower by `waist` at half height
+    Capsule,           ///< a segment along z of half length half_sizes_mm.z(), fattened by
+                       ///< half_sizes_mm.x()
+  };
+  Shape shape = Shape::Ellipsoid;
+  Eigen::Vector3d center_mm = Eigen::Vector3d::Zero();
+  Eigen::Vector3d half_sizes_mm = Eigen::Vector3d::Ones();
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< columns: the body's axes in ct
+  double waist = 0.0;  ///< share of the radius lost at half height, in [0, 1)
+  int hu = 0;
+  int texture_hu = 0;  ///< amplitude of the texture added to hu
+  double texture_scale_mm = 3.0;
+  Eigen::Vector3d texture_shift_mm = Eigen::Vector3d::Zero();  ///< other values at one point
+
+  [[nodiscard]] bool contains(const Eigen::Vector3d& ct_point_mm) const;
+  /// HU at a point of the body, with its texture.
+  [[nodiscard]] int hu_at(const Eigen::Vector3d& ct_point_mm) const;
+  /// A box along the ct axes that holds the body.
+  [[nodiscard]] CtBox bounds() const;
+};
+
+/// The capsule of radius `radius_mm` around the segment from a to b.
+Solid capsule_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double radius_mm, int hu);
+
+/// Smooth deterministic noise in [-1, 1], correlated over `scale_mm`: trilinear blends of hashed
+/// lattice values. For points within 1e15 scales of the origin.
+/// \test Texture.BlendsTheLatticeWhateverCameBefore
+double texture(const Eigen::Vector3d& ct_point_mm, double scale_mm);
+
+/// Bodies sampled on a grid with identity direction: every voxel is the mean HU of
+/// samples_per_axis^3 points, air (-1000 HU) elsewhere. The result does not depend on `threads`
+/// (0: as many as the hardware has).
+CtVolume sample_solids(const CtGrid& grid,
+                       const std::vector<Solid>& solids,
+                       int samples_per_axis,
+                       int threads);
+
+}  // namespace af

@@ -1,0 +1,279 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "attenuation_fields/registration.h"
+
+#include <cmath>
+#include <mutex>
+#include <utility>
+
+#include "base/error.h"
+#include "base/fork_aware_mutex.h"
+#include "base/joined.h"
+#include "base/thread_pool.h"
+#include "geometry/target_box.h"
+#include "geometry/tre.h"
+#include "library/translation.h"
+#include "register/case_loading.h"
+#include "register/method/method_options.h"
+#include "register/method/presets.h"
+#include "register/verdict/registrar.h"
+#include "study/case_gold_standard.h"
+#include "study/landmark_start.h"
+#include "study/study_file.h"
+
+namespace attenuation_fields {
+
+namespace library = af::library;
+namespace registration = af::registration;
+
+namespace {
+
+registration::MethodOptions method_options(const RegistrationOptions& options) {
+  registration::MethodOptions method;
+  if (!options.preset.empty()) method.preset = options.preset;
+  method.chains = options.chains;
+  method.similarity = options.similarity;
+  method.optimizer = options.optimizer;
+  method.max_evaluations = options.max_evaluations;
+  method.seed = options.seed;
+  method.threads = options.threads;
+  return method;
+}
+
+registration::UncertaintyOptions uncertainty_options(const RegistrationOptions& options) {
+  registration::UncertaintyOptions result;
+  result.is_left_out = options.no_uncertainty;
+  result.calibration_error_px = options.calibration_error_px;
+  af::throw_if_any(af::field_problems(result));
+  return result;
+}
+
+Uncertainty uncertainty_of(const registration::UncertaintyReport& report) {
+  Uncertainty result;
+  std::size_t next = 0;
+  for (std::size_t row = 0; row < 6; ++row)
+    for (std::size_t column = row; column < 6; ++column, ++next)
+      result.covariance[row][column] = result.covariance[column][row] =
+          report.covariance_deg_mm[next];
+  result.tre_rms_mm = report.tre_rms_mm;
+  result.tre_95_mm = report.tre_95_mm;
+  result.confidence = report.confidence;
+  return result;
+}
+
+registration::RegistrationOptions resolved_method(const RegistrationOptions& options) {
+  registration::RegistrationOptions method = resolve(method_options(options));
+  method.correction.is_wanted = options.correct;
+  return method;
+}
+
+registration::CaseLoadOptions load_options(const RegistrationOptions& options,
+                                           const registration::RegistrationOptions& method,
+                                           const std::shared_ptr<af::ThreadPool>& pool) {
+  if (options.renderer != "field" && options.renderer != "raycast")
+    throw af::InputError("renderer", options.renderer, "must be field or raycast");
+  const bool casts = options.renderer == "raycast";
+  if (casts && options.skip_ct_check)
+    throw af::InputError("skip_ct_check = set: ray casting needs the CT; leave it out");
+  if (options.correct && options.skip_ct_check)
+    throw af::InputError(
+        "correct = set: must not be given with skip_ct_check, because it casts rays through the "
+        "CT");
+  if (options.skip_ct_check && method.silhouette_mm() > 0.0)
+    throw af::InputError(registration::kSilhouettesNeedTheCt);
+  if (options.correct && casts) throw af::InputError(registration::kCorrectsRayCasting);
+  registration::CaseLoadOptions result;
+  result.renderer = casts ? registration::RendererKind::RayCast : registration::RendererKind::Field;
+  result.field_paths = options.fields;
+  result.attenuation = {options.water_mu_per_mm, options.air_below_hu};
+  result.ray_caster.step_mm = method.correction.cast_step_mm(options.step_mm);
+  af::throw_if_any(problems(result.attenuation));
+  af::throw_if_any(problems(result.ray_caster));
+  result.skip_ct_check = options.skip_ct_check;
+  result.fiducial_mask_mm = method_options(options).fiducial_mask_mm;
+  result.coarsest_level = method.coarsest_level();
+  result.judging_level = registration::PoseExaminer::coarsest_level();
+  if (options.correct) result.correction_levels = method.last_levels();
+  result.pool = pool;
+  return result;
+}
+
+}  // namespace
+
+std::vector<std::string> preset_names() {
+  return registration::preset_names();
+}
+
+std::string preset_help() {
+  return registration::preset_help();
+}
+
+struct RegistrationCase::Impl {
+  std::string name;
+  PoseFrame frame;
+  std::vector<std::string> warnings;
+  af::Study study;
+  std::optional<af::GoldStandard> gold;
+  std::vector<Eigen::Vector3d> target_points;
+  std::shared_ptr<const registration::RegistrationProblem> problem;
+  std::unique_ptr<registration::Registrar> registrar;
+  af::ForkAwareMutex mutex;  ///< of registrar
+
+  [[nodiscard]] std::optional<double> tre_mm(const af::RigidTransform& pose) const {
+    if (!gold.has_value()) return std::nullopt;
+    return af::mean_tre_mm(pose, gold->room_from_ct, target_points);
+  }
+
+  /// `is_diagnosed`: X-rays that do not fit are looked into, as af-register does for its best end.
+  Registration run(const af::RigidTransform& start, std::int64_t start_index, bool is_diagnosed) {
+    registration::RegistrationRecord record = registrar->run(start, start_index);
+    if (is_diagnosed) registration::diagnose(problem, record);
+    const registration::RegistrationResult& result = record.result;
+    const auto judgement = registration::judgement_of(record);
+    Registration found;
+    found.start_index = start_index;
+    found.start = library::pose_of(result.start_room_from_ct);
+    found.pose = library::pose_of(result.room_from_ct);
+    found.start_parameters = parameters_of(result.start_room_from_ct);
+    found.parameters = parameters_of(result.room_from_ct);
+    found.verdict = registration::to_string(judgement.verdict);
+    found.reason = judgement.reason;
+    found.similarity = result.similarity;
+    found.chain = result.chain;
+    found.stop_reason = registration::to_string(result.stop_reason);
+    found.evaluations = result.evaluations;
+    found.inadmissible = result.inadmissible;
+    found.drr_count = result.drr_count;
+    for (std::size_t i = 0; i < record.view_values.size(); ++i)
+      found.views.push_back({problem->views[i].view.camera.name,
+                             record.view_values[i].coarse,
+                             record.view_values[i].fine});
+    found.uncertainty = uncertainty_of(record.uncertainty);
+    found.initial_tre_mm = tre_mm(result.start_room_from_ct);
+    found.tre_mm = tre_mm(result.room_from_ct);
+    found.seconds = result.seconds;
+    return found;
+  }
+
+ private:
+  [[nodiscard]] std::array<double, 6> parameters_of(const af::RigidTransform& pose) const {
+    return af::parameters_from_pose(problem->frame(), pose).deg_and_mm();
+  }
+};
+
+RegistrationCase::RegistrationCase(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+RegistrationCase RegistrationCase::load(const std::filesystem::path& study_path,
+                                        const std::string& case_name,
+                                        const RegistrationOptions& options) {
+  return load(study_path, case_name, options, Beam{});
+}
+
+RegistrationCase RegistrationCase::load(const std::filesystem::path& study_path,
+                                        const std::string& case_name,
+                                        const RegistrationOptions& options,
+                                        const Beam& beam) {
+  return library::translated_reading([&] {
+    const registration::RegistrationOptions method = resolved_method(options);
+    af::throw_if_any(af::thread_problems(options.threads));
+    const auto pool = std::make_shared<af::ThreadPool>(af::thread_count(options.threads));
+    registration::CaseLoadOptions loading = load_options(options, method, pool);
+    loading.beam = library::checked_beam(beam);
+    auto impl = std::make_shared<Impl>();
+    impl->study = af::read_study(study_path, &impl->warnings);
+    const af::Study& study = impl->study;
+    const af::StudyCase& study_case = study.find_case(case_name);
+    impl->name = study_case.name;
+    impl->frame = library::frame_of(study_case.frame());
+    impl->gold = af::known_gold(study, study_case);
+    impl->target_points = af::target_points(study_case.target_box_ct);
+    const registration::LoadedCase loaded =
+        registration::load_case(study, study_case, loading, af::Communicator::alone());
+    impl->warnings.insert(impl->warnings.end(), loaded.warnings.begin(), loaded.warnings.end());
+    impl->problem = loaded.problem;
+    impl->registrar = std::make_unique<registration::Registrar>(
+        loaded.problem,
+        registration::RegistrationRunner(loaded.problem, method, pool),
+        uncertainty_options(options),
+        pool);
+    return RegistrationCase(std::move(impl));
+  });
+}
+
+const std::string& RegistrationCase::name() const {
+  return impl_->name;
+}
+
+std::vector<CaseView> RegistrationCase::views() const {
+  std::vector<CaseView> views;
+  for (const registration::RegistrationView& view : impl_->problem->views) {
+    const af::RegionOfInterest& roi = view.view.roi;
+    views.push_back({library::camera_of(view.view.camera),
+                     {roi.column, roi.row, roi.width, roi.height},
+                     view.xray.pixels,
+                     view.mask.pixels});
+  }
+  return views;
+}
+
+const PoseFrame& RegistrationCase::frame() const {
+  return impl_->frame;
+}
+
+const std::vector<std::string>& RegistrationCase::warnings() const {
+  return impl_->warnings;
+}
+
+std::optional<Pose> RegistrationCase::gold() const {
+  if (!impl_->gold.has_value()) return std::nullopt;
+  return library::pose_of(impl_->gold->room_from_ct);
+}
+
+std::optional<double> RegistrationCase::tre_mm(const Pose& pose) const {
+  return library::translated([&] { return impl_->tre_mm(library::transform_of(pose, "pose")); });
+}
+
+std::optional<Pose> RegistrationCase::landmark_start() const {
+  return library::translated([&]() -> std::optional<Pose> {
+    const af::StudyCase& study_case = impl_->study.find_case(impl_->name);
+    if (!af::has_landmarks(study_case)) return std::nullopt;
+    return library::pose_of(af::landmark_pose(impl_->study, study_case).room_from_ct);
+  });
+}
+
+Pose RegistrationCase::usual_start() const {
+  const std::optional<Pose> by_landmarks = landmark_start();
+  return by_landmarks.has_value() ? *by_landmarks : frame().pose({}, {});
+}
+
+Registration RegistrationCase::run(const Pose& start, std::int64_t start_index) const {
+  return library::translated([&] {
+    const af::RigidTransform room_from_ct = library::transform_of(start, "start");
+    const std::lock_guard turn(impl_->mutex);
+    return impl_->run(room_from_ct, start_index, true);
+  });
+}
+
+std::vector<Registration> RegistrationCase::run_all(std::span<const Pose> starts) const {
+  return library::translated([&] {
+    std::vector<af::RigidTransform> transforms;
+    for (std::size_t i = 0; i < starts.size(); ++i)
+      transforms.push_back(library::transform_of(starts[i], "start " + std::to_string(i)));
+    const std::lock_guard turn(impl_->mutex);
+    std::vector<Registration> found;
+    for (std::size_t i = 0; i < transforms.size(); ++i)
+      found.push_back(impl_->run(transforms[i], static_cast<std::int64_t>(i), false));
+    return found;
+  });
+}
+
+std::optional<double> RegistrationCase::similarity(const Pose& pose) const {
+  return library::translated([&]() -> std::optional<double> {
+    const af::RigidTransform room_from_ct = library::transform_of(pose, "pose");
+    const std::lock_guard turn(impl_->mutex);
+    const registration::ObjectiveValue value =
+        impl_->registrar->runner().similarity_at(room_from_ct);
+    return value.is_admissible ? std::optional(value.similarity) : std::nullopt;
+  });
+}
+
+}  // namespace attenuation_fields

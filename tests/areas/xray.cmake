@@ -1,0 +1,3 @@
+# SPDX-License-Identifier: Apache-2.0
+af_add_test(image_test SOURCES unit/xray/image_test.cpp unit/xray/bilinear_test.cpp unit/xray/xray_borders_test.cpp LIBS af_xray)
+af_add_test(image_file_test SOURCES unit/xray/image_file_test.cpp unit/ct/ct_test_data.cpp LIBS af_study ZLIB::ZLIB)

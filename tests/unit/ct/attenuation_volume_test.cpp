@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ct/attenuation_volume.h"
+
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "support/ct_phantoms.h"
+
+namespace af {
+namespace {
+
+CtGrid grid_of(int i, int j, int k) {
+  CtGrid grid;
+  grid.size = {i, j, k};
+  grid.spacing_mm = {0.5, 1.0, 2.0};
+  grid.origin_mm = {-10.0, 20.0, 30.0};
+  return grid;
+}
+
+TEST(AttenuationModel, FollowsTheContractsRule) {
+  const AttenuationModel model;
+  EXPECT_EQ(model.relative_attenuation(-1024), 0);
+  EXPECT_EQ(model.relative_attenuation(-901), 0);
+  EXPECT_EQ(model.relative_attenuation(-900), 100);
+  EXPECT_EQ(model.relative_attenuation(0), 1000);
+  EXPECT_EQ(model.relative_attenuation(32767), 33767);
+  EXPECT_DOUBLE_EQ(model.mu_per_mm_per_unit() * 1000, 0.02);
+}
+
+TEST(AttenuationVolume, KeepsOnlyTheAttenuatingBoxWithAZeroBorder) {
+  const CtVolume ct = box_phantom(grid_of(20, 10, 8), {4, 3, 2}, {9, 3, 5}, 500);
+  const AttenuationVolume volume(ct, {});
+  EXPECT_EQ(volume.grid().size, (std::array<int, 3>{8, 3, 6}));
+  EXPECT_TRUE(volume.grid().origin_mm.isApprox(ct.grid.point_mm({3, 2, 1})));
+  std::size_t attenuating = 0;
+  for (const std::uint16_t voxel : volume.voxels()) {
+    EXPECT_TRUE(voxel == 0 || voxel == 1500);
+    attenuating += voxel > 0 ? 1 : 0;
+  }
+  EXPECT_EQ(attenuating, 6u * 1u * 4u);
+  EXPECT_DOUBLE_EQ(volume.max_mu_per_mm(), 0.03);
+}
+
+TEST(AttenuationVolume, AllAirIsRefused) {
+  const CtVolume ct = box_phantom(grid_of(4, 4, 4), {1, 1, 1}, {2, 2, 2}, -950);
+  EXPECT_THROW(AttenuationVolume(ct, {}), InputError);
+}
+
+TEST(AttenuationModel, NamesBadConstants) {
+  EXPECT_TRUE(problems(AttenuationModel{}).empty());
+  EXPECT_EQ(problems(AttenuationModel{.mu_water_per_mm = 0.0, .air_below_hu = 5}).size(), 2u);
+}
+
+}  // namespace
+}  // namespace af
