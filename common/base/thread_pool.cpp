@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/fork_aware_mutex.h"
+#include "base/processor.h"
 #include "base/stop_condition.h"
 
 namespace af {
@@ -34,7 +35,7 @@ bool watch(Condition is_over) {
   do {
     for (int i = 0; i < kChecksPerLook; ++i) {
       if (is_over()) return true;
-      __builtin_ia32_pause();
+      processor::pause();
     }
   } while (std::chrono::steady_clock::now() < until);
   return is_over();

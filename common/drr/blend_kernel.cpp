@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "drr/blend_kernel.h"
 
-#include "base/vec_native.h"
+#include "base/processor.h"
 
 namespace af::AF_KERNEL_NAMESPACE {
 

@@ -3,22 +3,11 @@
 
 #include <string.h>
 
-#include "base/vec_native.h"
+#include "base/processor.h"
 
 namespace af::AF_KERNEL_NAMESPACE {
 
 namespace {
-
-/// The levels of a mean-removed tile: differences stand 32768 higher, and sums are limited.
-AF_KERNEL_INLINE void add_mean(const uint16_t* shape, uint16_t mean, uint16_t* levels) {
-  const __m128i middle = _mm_set1_epi16(INT16_MIN);
-  const __m128i from_middle = _mm_xor_si128(_mm_set1_epi16(static_cast<short>(mean)), middle);
-  for (int i = 0; i < 2; ++i) {
-    const __m128i elements = _mm_loadu_si128(reinterpret_cast<const __m128i*>(shape) + i);
-    const __m128i sums = _mm_adds_epi16(_mm_xor_si128(elements, middle), from_middle);
-    _mm_storeu_si128(reinterpret_cast<__m128i*>(levels) + i, _mm_xor_si128(sums, middle));
-  }
-}
 
 template <bool kHasMeans>
 AF_KERNEL_INLINE void decode_plane(const TilePlane& tiles,
@@ -31,7 +20,7 @@ AF_KERNEL_INLINE void decode_plane(const TilePlane& tiles,
       const uint16_t* codeword = tiles.codewords + 16 * static_cast<int64_t>(*index);
       uint16_t levels[16];
       if constexpr (kHasMeans) {
-        add_mean(codeword, index[tiles.t_tiles], levels);
+        native::add_mean(codeword, index[tiles.t_tiles], levels);
         codeword = levels;
       }
       for (int viewpoint = 0; viewpoint < 4; ++viewpoint) {

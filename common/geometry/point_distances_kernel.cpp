@@ -1,35 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "geometry/point_distances_kernel.h"
 
-#include <immintrin.h>
+#include "base/processor.h"
 
 namespace af::AF_KERNEL_NAMESPACE {
 
 namespace {
 
-#define AF_INLINE static inline __attribute__((always_inline))
-
 constexpr int kLanes = AF_VECTOR_BITS / 64;
 constexpr int kParts = 8;  // partial sums, whatever the width
 constexpr int kGroups = kParts / kLanes;
 
-using Doubles = double __attribute__((vector_size(AF_VECTOR_BITS / 8)));
-
-AF_INLINE Doubles root(Doubles value) {
-#if AF_VECTOR_BITS == 512
-  return _mm512_sqrt_pd(value);
-#elif AF_VECTOR_BITS == 256
-  return _mm256_sqrt_pd(value);
-#else
-  return _mm_sqrt_pd(value);
-#endif
-}
+using native::Doubles;
 
 struct Vectors {
   Doubles x, y, z;
 };
 
-AF_INLINE Vectors load(const double* points) {
+AF_KERNEL_INLINE Vectors load(const double* points) {
   Vectors loaded;
   for (int lane = 0; lane < kLanes; ++lane) {
     loaded.x[lane] = points[3 * lane];
@@ -39,17 +27,17 @@ AF_INLINE Vectors load(const double* points) {
   return loaded;
 }
 
-AF_INLINE Doubles row(const PointMap& map, int i, const Vectors& point) {
+AF_KERNEL_INLINE Doubles row(const PointMap& map, int i, const Vectors& point) {
   return map.matrix[i][0] * point.x + map.matrix[i][1] * point.y + map.matrix[i][2] * point.z +
          map.offset[i];
 }
 
-AF_INLINE Vectors mapped(const PointMap& map, const Vectors& point) {
+AF_KERNEL_INLINE Vectors mapped(const PointMap& map, const Vectors& point) {
   return {row(map, 0, point), row(map, 1, point), row(map, 2, point)};
 }
 
-AF_INLINE Doubles length(const Vectors& vector) {
-  return root(vector.x * vector.x + vector.y * vector.y + vector.z * vector.z);
+AF_KERNEL_INLINE Doubles length(const Vectors& vector) {
+  return native::square_root(vector.x * vector.x + vector.y * vector.y + vector.z * vector.z);
 }
 
 /// Partial sums of eight points each, added pairwise.
@@ -70,7 +58,7 @@ struct PartialSums {
 /// Calls add(group, points, weights) for every register of points; the last block is filled up with
 /// copies of the last point of weight 0.
 template <typename Add>
-AF_INLINE void for_each_register(const double* points, int64_t count, Add add) {
+AF_KERNEL_INLINE void for_each_register(const double* points, int64_t count, Add add) {
   const Doubles one = Doubles{} + 1.0;
   int64_t i = 0;
   for (; i + kParts <= count; i += kParts)
@@ -122,7 +110,7 @@ ProjectionSums sum_projections(const double* points,
     reprojection.groups[group] += weight * (length(cross) / length(here));
     const Doubles column = here.x / here.z - gold.x / gold.z;
     const Doubles line = here.y / here.z - gold.y / gold.z;
-    slope.groups[group] += weight * root(column * column + line * line);
+    slope.groups[group] += weight * native::square_root(column * column + line * line);
     smallest_depth = here.z < smallest_depth ? here.z : smallest_depth;
     smallest_depth = gold.z < smallest_depth ? gold.z : smallest_depth;
   });

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "precompute/casting/shear_warp_kernel.h"
 
-#include "base/vec16.h"
-#include "base/vec_native.h"
+#include "base/processor.h"
 
 namespace af::AF_KERNEL_NAMESPACE {
+
+using namespace lanes16;
 
 namespace {
 
@@ -67,60 +68,43 @@ AF_KERNEL_INLINE const int16_t* block_of(const int16_t* values, const ShearRow& 
   return is_stored ? values + (row.origin + x) : kZeros;
 }
 
-/// 16-bit lanes of one register, and its groups of eight.
+/// 16-bit lanes of one register.
 constexpr int kRegisterShorts = kShearColumns / kRegisters;
-constexpr int kRegisterGroups = kRegisterShorts / 8;
 
 /// Eight columns from `group` on for the places of one register, from x + `first` on. Registers one
 /// by one, because GCC keeps vectors of several in memory.
 template <bool kIsStored>
 AF_KERNEL_INLINE void interpolate_block(
-    const ShearColumns& columns, int group, int32_t x, int first, IntegerRegister (&block)[8]) {
+    const ShearColumns& columns, int group, int32_t x, int first, native::Register (&block)[8]) {
   for (int i = 0; i < 8; ++i) {
     const int j = group + i;
-    IntegerRegister lower;
-    IntegerRegister upper;
+    native::Register lower;
+    native::Register upper;
     memcpy(&lower, block_of<kIsStored>(columns.values, columns.lower[j], x) + first, sizeof(lower));
     memcpy(&upper, block_of<kIsStored>(columns.values, columns.upper[j], x) + first, sizeof(upper));
-    block[i] = AF_INTRINSIC(add_epi16)(
-        lower,
-        AF_INTRINSIC(mulhrs_epi16)(AF_INTRINSIC(sub_epi16)(upper, lower),
-                                   AF_INTRINSIC(set1_epi16)(columns.weight[j])));
+    block[i] = native::add_shorts(lower,
+                                  native::multiply_rounded(native::subtract_shorts(upper, lower),
+                                                           native::splat_short(columns.weight[j])));
   }
 }
 
 /// Transposes 8 x 8 lanes within each group: rows of x become rows of t.
-AF_KERNEL_INLINE void transpose_groups(IntegerRegister (&rows)[8]) {
-  IntegerRegister pairs[8];
+AF_KERNEL_INLINE void transpose_groups(native::Register (&rows)[8]) {
+  native::Register pairs[8];
   for (int i = 0; i < 4; ++i) {
-    pairs[2 * i] = AF_INTRINSIC(unpacklo_epi16)(rows[2 * i], rows[2 * i + 1]);
-    pairs[2 * i + 1] = AF_INTRINSIC(unpackhi_epi16)(rows[2 * i], rows[2 * i + 1]);
+    pairs[2 * i] = native::interleave_low_16(rows[2 * i], rows[2 * i + 1]);
+    pairs[2 * i + 1] = native::interleave_high_16(rows[2 * i], rows[2 * i + 1]);
   }
-  IntegerRegister fours[8];
+  native::Register fours[8];
   for (int half = 0; half < 8; half += 4)
     for (int i = 0; i < 2; ++i) {
-      fours[half + 2 * i] = AF_INTRINSIC(unpacklo_epi32)(pairs[half + i], pairs[half + i + 2]);
-      fours[half + 2 * i + 1] = AF_INTRINSIC(unpackhi_epi32)(pairs[half + i], pairs[half + i + 2]);
+      fours[half + 2 * i] = native::interleave_low_32(pairs[half + i], pairs[half + i + 2]);
+      fours[half + 2 * i + 1] = native::interleave_high_32(pairs[half + i], pairs[half + i + 2]);
     }
   for (int i = 0; i < 4; ++i) {
-    rows[2 * i] = AF_INTRINSIC(unpacklo_epi64)(fours[i], fours[i + 4]);
-    rows[2 * i + 1] = AF_INTRINSIC(unpackhi_epi64)(fours[i], fours[i + 4]);
+    rows[2 * i] = native::interleave_low_64(fours[i], fours[i + 4]);
+    rows[2 * i + 1] = native::interleave_high_64(fours[i], fours[i + 4]);
   }
-}
-
-/// Stores a register's groups at to, to + stride, ...
-AF_KERNEL_INLINE void store_groups(int16_t* to, int stride, IntegerRegister value) {
-#if AF_VECTOR_BITS == 512
-  const __m128i groups[] = {_mm512_extracti32x4_epi32(value, 0),
-                            _mm512_extracti32x4_epi32(value, 1),
-                            _mm512_extracti32x4_epi32(value, 2),
-                            _mm512_extracti32x4_epi32(value, 3)};
-#elif AF_VECTOR_BITS == 256
-  const __m128i groups[] = {_mm256_castsi256_si128(value), _mm256_extracti128_si256(value, 1)};
-#else
-  const __m128i groups[] = {value};
-#endif
-  for (int i = 0; i < kRegisterGroups; ++i) memcpy(to + i * stride, &groups[i], sizeof(groups[i]));
 }
 
 /// Adds all slices of one node s to the sums of the columns of one register: within each group of
@@ -132,21 +116,21 @@ AF_KERNEL_INLINE void add_slices(const int16_t* columns,
                                  int32_t slices,
                                  int32_t* low,
                                  int32_t* high) {
-  IntegerRegister low_sum;
-  IntegerRegister high_sum;
+  native::Register low_sum;
+  native::Register high_sum;
   memcpy(&low_sum, low, sizeof(low_sum));
   memcpy(&high_sum, high, sizeof(high_sum));
   for (int k = 0; k < slices; ++k) {
     const int16_t* row = columns + offsets[k];
-    IntegerRegister lower;
-    IntegerRegister upper;
+    native::Register lower;
+    native::Register upper;
     memcpy(&lower, row, sizeof(lower));
     memcpy(&upper, row + kShearColumns, sizeof(upper));
-    const IntegerRegister weight = AF_INTRINSIC(set1_epi32)(weights[k]);
-    low_sum = AF_INTRINSIC(add_epi32)(
-        low_sum, AF_INTRINSIC(madd_epi16)(AF_INTRINSIC(unpacklo_epi16)(lower, upper), weight));
-    high_sum = AF_INTRINSIC(add_epi32)(
-        high_sum, AF_INTRINSIC(madd_epi16)(AF_INTRINSIC(unpackhi_epi16)(lower, upper), weight));
+    const native::Register weight = native::splat_int(weights[k]);
+    low_sum = native::add_ints(
+        low_sum, native::multiply_add_pairs(native::interleave_low_16(lower, upper), weight));
+    high_sum = native::add_ints(
+        high_sum, native::multiply_add_pairs(native::interleave_high_16(lower, upper), weight));
   }
   memcpy(low, &low_sum, sizeof(low_sum));
   memcpy(high, &high_sum, sizeof(high_sum));
@@ -181,14 +165,14 @@ void interpolate_columns(const ShearColumns& columns,
       const int32_t x = first_x + done;
       const bool is_whole = x >= columns.whole_begin && x < columns.whole_end;
       for (int first = 0; first < kShearColumns; first += kRegisterShorts) {
-        IntegerRegister block[8];
+        native::Register block[8];
         if (is_whole)
           interpolate_block<true>(columns, group, x, first, block);
         else
           interpolate_block<false>(columns, group, x, first, block);
         transpose_groups(block);
         for (int i = 0; i < 8; ++i)
-          store_groups(
+          native::store_groups(
               buffer + (done + first + i) * kShearColumns + group, 8 * kShearColumns, block[i]);
       }
     }

@@ -2,12 +2,11 @@
 // Exact nearest codeword (see nearest_codeword.h). Compiled once per vector width.
 #include "precompute/codebook/nearest_codeword_kernel.h"
 
-#include <immintrin.h>
-
-#include "base/vec16.h"
-#include "base/vec_native.h"
+#include "base/processor.h"
 
 namespace af::AF_KERNEL_NAMESPACE {
+
+using namespace lanes16;
 
 namespace {
 
@@ -17,39 +16,12 @@ struct Lanes {
 };
 constexpr int kParts = 16 / native::kLanes;
 
-/// Bits of the lanes of a comparison's result that are set.
-AF_KERNEL_INLINE uint32_t bits_of(native::Ints mask) {
-#if AF_VECTOR_BITS == 512
-  return _mm512_movepi32_mask(reinterpret_cast<__m512i>(mask));
-#elif AF_VECTOR_BITS == 256
-  return static_cast<uint32_t>(_mm256_movemask_ps(reinterpret_cast<__m256>(mask)));
-#else
-  return static_cast<uint32_t>(_mm_movemask_ps(reinterpret_cast<__m128>(mask)));
-#endif
-}
-
 /// Bits of the lanes that are no greater than a limit.
 AF_KERNEL_INLINE uint32_t bits_within(const Lanes& lanes, float limit) {
   uint32_t bits = 0;
   for (int i = 0; i < kParts; ++i)
-    bits |= bits_of(lanes.part[i] <= native::splat(limit)) << (i * native::kLanes);
+    bits |= native::bits_of(lanes.part[i] <= native::splat(limit)) << (i * native::kLanes);
   return bits;
-}
-
-AF_KERNEL_INLINE float smallest(const Lanes& lanes) {
-#if AF_VECTOR_BITS == 512
-  return _mm512_reduce_min_ps(lanes.part[0]);
-#else
-#if AF_VECTOR_BITS == 256
-  const __m256 pairs = _mm256_min_ps(lanes.part[0], lanes.part[1]);
-  const __m128 fours = _mm_min_ps(_mm256_castps256_ps128(pairs), _mm256_extractf128_ps(pairs, 1));
-#else
-  const __m128 fours = _mm_min_ps(_mm_min_ps(lanes.part[0], lanes.part[1]),
-                                  _mm_min_ps(lanes.part[2], lanes.part[3]));
-#endif
-  const __m128 twos = _mm_min_ps(fours, _mm_movehl_ps(fours, fours));
-  return _mm_cvtss_f32(_mm_min_ss(twos, _mm_shuffle_ps(twos, twos, 1)));
-#endif
 }
 
 AF_KERNEL_INLINE void set_lane(Lanes& lanes, uint32_t lane, float value) {
@@ -177,7 +149,7 @@ AF_KERNEL_INLINE void add_squared_difference(Lanes& sum, float coefficient, cons
 AF_KERNEL_INLINE void offer_lanes(
     const CodewordBlocks& blocks, uint32_t block, const uint16_t* tile, Lanes sums, Best& best) {
   while (bits_within(sums, best.limit) != 0) {
-    const float nearest = smallest(sums);
+    const float nearest = native::smallest(sums.part);
     const auto lane = static_cast<uint32_t>(__builtin_ctz(bits_within(sums, nearest)));
     const uint32_t candidate = blocks.indices[block * 16 + lane];
     const uint64_t error =
@@ -263,7 +235,7 @@ AF_KERNEL_INLINE Best search_boxes(const CodewordBlocks& blocks, const uint16_t*
   to_children[0] = distances(blocks.boxes[0][0], coefficients);
   const int32_t last = blocks.box_levels - 1;
   for (int32_t level = 0; level >= 0;) {
-    const float nearest = smallest(to_children[level]);
+    const float nearest = native::smallest(to_children[level].part);
     if (!(nearest <= best.limit)) {
       --level;
       continue;

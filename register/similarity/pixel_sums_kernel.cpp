@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "register/similarity/pixel_sums_kernel.h"
 
-#include "base/vec_native.h"
+#include "base/processor.h"
 
 namespace af::registration::AF_KERNEL_NAMESPACE {
 
-// base/vec_native.h puts its vectors into the same variant of namespace af.
+// base/processor.h puts its vectors into the same variant of namespace af.
 using namespace af::AF_KERNEL_NAMESPACE::native;
 
 namespace {

@@ -4,9 +4,11 @@
 // are nearly exact, a fused multiply-add where the width has one. Compiled once per vector width.
 #include "benchmark/brute_force_kernel.h"
 
-#include "base/vec16.h"
+#include "base/processor.h"
 
 namespace af::AF_KERNEL_NAMESPACE {
+
+using namespace lanes16;
 
 namespace {
 
@@ -14,17 +16,7 @@ constexpr int kTilesAtOnce = 4;
 constexpr int kElements = 16;
 
 AF_KERNEL_INLINE Floats16 add_square(Floats16 sum, Floats16 value) {
-#if AF_VECTOR_BITS == 512
-  __m512 total;
-  __m512 factor;
-  memcpy(&total, &sum, sizeof(total));
-  memcpy(&factor, &value, sizeof(factor));
-  total = _mm512_fmadd_ps(factor, factor, total);
-  memcpy(&sum, &total, sizeof(sum));
-  return sum;
-#else
-  return sum + value * value;
-#endif
+  return multiply_add(value, value, sum);
 }
 
 AF_KERNEL_INLINE uint64_t exact_error(const uint16_t* a, const uint16_t* b) {

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "benchmark/machine_kernel.h"
 
-#include "base/vec16.h"
+#include "base/processor.h"
 
 namespace af::AF_KERNEL_NAMESPACE {
+
+using namespace lanes16;
 
 namespace {
 
@@ -24,20 +26,20 @@ int32_t read_all(const int32_t* values, size_t count, size_t repetitions) {
 }
 
 int32_t multiply_add_pairs(const int32_t* values, size_t count, size_t repetitions) {
-  IntegerRegister sums[8];
-  IntegerRegister factors[8];
+  native::Register sums[8];
+  native::Register factors[8];
   for (int j = 0; j < 8; ++j) {
-    sums[j] = AF_INTRINSIC(set1_epi32)(j);
-    factors[j] = AF_INTRINSIC(set1_epi32)(values[j]);
+    sums[j] = native::splat_int(j);
+    factors[j] = native::splat_int(values[j]);
   }
   for (size_t repetition = 0; repetition < repetitions; ++repetition)
     for (size_t i = 0; i < count; ++i) {
-      const IntegerRegister weight = AF_INTRINSIC(set1_epi32)(values[i]);
+      const native::Register weight = native::splat_int(values[i]);
       for (int j = 0; j < 8; ++j)
-        sums[j] = AF_INTRINSIC(add_epi32)(sums[j], AF_INTRINSIC(madd_epi16)(factors[j], weight));
+        sums[j] = native::add_ints(sums[j], native::multiply_add_pairs(factors[j], weight));
     }
   int32_t result = 0;
-  for (const IntegerRegister& sum : sums) {
+  for (const native::Register& sum : sums) {
     int32_t first = 0;
     memcpy(&first, &sum, sizeof(first));
     result ^= first;
