@@ -7,7 +7,7 @@ set -euo pipefail
 source "$(dirname "$0")/source_files.sh"
 command -v clang-tidy-14 >/dev/null || skip_or_fail clang-tidy-14
 root=$(cd "$(dirname "$0")/../.." && pwd)
-pattern=${1:-^(common|precompute|register|evaluate)/}
+pattern=${1:-^(common|precompute|register|evaluate|tools|library)/}
 build="$root/build/tidy"
 cd "$root"
 cmake --preset dev -B "$build" >/dev/null
