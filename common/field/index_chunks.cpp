@@ -15,11 +15,13 @@ namespace {
 
 constexpr int kMostDoublings = 16;
 
-/// Tiles along u that a chunk spans: whoever reads a field holds so many planes of equal u.
+/// Tiles along u that a chunk spans: whoever reads a field holds so many planes of equal u. Of few
+/// tiles, the first chunk spans the middle and its neighbours and leaves the last ones out, so that
+/// a DRR near nominal needs one of two chunks.
 hsize_t tiles_along_u(const std::vector<std::uint64_t>& extents) {
   constexpr std::uint64_t kMostTilesAtOnce = std::uint64_t{16} << 20;
   const std::uint64_t plane = extents[1] * extents[2] * extents[3];
-  hsize_t tiles = kIndexChunkTilesAlongU;
+  hsize_t tiles = std::min<hsize_t>(kIndexChunkTilesAlongU, extents[0] / 2 + 2);
   while (tiles > 1 && tiles * plane > kMostTilesAtOnce) tiles /= 2;
   return std::min<hsize_t>(tiles, extents[0]);
 }

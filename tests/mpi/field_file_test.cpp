@@ -414,7 +414,10 @@ TEST(FieldFile, ChunksGrowAlongVOnlyWhereThereWouldBeTooMany) {
   // As many planes of equal u as are 32 MiB.
   EXPECT_EQ(chunks_of({{64, 64, 512, 128}})[0], (ChunkShape{4, 1, 32, 64}));
   EXPECT_EQ(chunks_of({{64, 64, 512, 320}})[0], (ChunkShape{1, 1, 32, 64}));
-  EXPECT_EQ(chunks_of({{5, 4, 3, 7}})[0], (ChunkShape{5, 1, 3, 7}));
+  // Tiles 2 to 4 of 7, or 1 to 3 of 5, lie about the nominal viewpoint: one chunk holds them.
+  EXPECT_EQ(chunks_of({{7, 7, 144, 102}})[0], (ChunkShape{5, 1, 32, 64}));
+  EXPECT_EQ(chunks_of({{5, 4, 3, 7}})[0], (ChunkShape{4, 1, 3, 7}));
+  EXPECT_EQ(chunks_of({{2, 4, 3, 7}})[0], (ChunkShape{2, 1, 3, 7}));
   // 2^20 chunks, and one column more.
   EXPECT_EQ(chunks_of({{128, 128, 1024, 512}})[0], (ChunkShape{1, 4, 32, 64}));
   EXPECT_EQ(chunks_of({{128, 128, 1024, 513}})[0], (ChunkShape{1, 8, 32, 64}));
