@@ -50,6 +50,6 @@ af_add_test(
   LIBS af_evaluate_sweeps af_register af_precompute af_tools_drr af_tools_inspect af_evaluate_scan
        af_evaluate_simulate PkgConfig::tomlplusplus)
 
-add_test(NAME population_program COMMAND ${PROJECT_SOURCE_DIR}/tests/checks/population_program.sh
+add_test(NAME population_program COMMAND ${PROJECT_SOURCE_DIR}/tests/programs/population_program.sh
                                          ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR}/bin)
 set_tests_properties(population_program PROPERTIES LABELS mpi TIMEOUT 900)

@@ -29,11 +29,11 @@ af_add_mpi_test(
   LIBS af_precompute_build
   RANKS 1 2 3 4)
 
-add_test(NAME precompute_program COMMAND ${PROJECT_SOURCE_DIR}/tests/checks/precompute_program.sh
+add_test(NAME precompute_program COMMAND ${PROJECT_SOURCE_DIR}/tests/programs/precompute_program.sh
                                          $<TARGET_FILE:af-precompute> ${MPIEXEC_EXECUTABLE} ${af_sanitized})
 set_tests_properties(precompute_program PROPERTIES LABELS mpi TIMEOUT 1800)
 
-add_test(NAME atlas_program COMMAND ${PROJECT_SOURCE_DIR}/tests/checks/atlas_program.sh
+add_test(NAME atlas_program COMMAND ${PROJECT_SOURCE_DIR}/tests/programs/atlas_program.sh
                                     ${PROJECT_BINARY_DIR}/bin ${MPIEXEC_EXECUTABLE})
 set_tests_properties(atlas_program PROPERTIES LABELS mpi TIMEOUT 900)
 

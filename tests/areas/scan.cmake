@@ -18,6 +18,6 @@ af_add_program_tests(
 target_compile_definitions(scan_program_tests
                            PRIVATE AF_CBCT_CYLINDER_TOML="${PROJECT_SOURCE_DIR}/docs/data/cbct-cylinder.toml")
 
-add_test(NAME real_xrays_program COMMAND ${PROJECT_SOURCE_DIR}/tests/checks/real_xrays_program.sh
+add_test(NAME real_xrays_program COMMAND ${PROJECT_SOURCE_DIR}/tests/programs/real_xrays_program.sh
                                          ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR}/bin)
 set_tests_properties(real_xrays_program PROPERTIES LABELS mpi TIMEOUT 900)

@@ -8,7 +8,7 @@
 # judged, its limit is larger, and it runs on at most 4 ranks.
 set -euo pipefail
 
-# shellcheck source=tests/checks/body_ct.sh
+# shellcheck source=tests/programs/body_ct.sh
 . "$(dirname "$0")/body_ct.sh"
 
 program=$1
