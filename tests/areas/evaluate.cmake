@@ -35,13 +35,20 @@ af_add_program_tests(
   TIMEOUT 120)
 
 af_add_program_tests(
-  evaluate_program_tests
-  SOURCES programs/evaluate_program_test.cpp support/launched_job.cpp
+  evaluate_program_tests PREPARED
+  SOURCES programs/evaluate_program_test.cpp
   LIBS af_register af_ranks
   PROGRAMS af-evaluate af-precompute
   LABELS programs mpi
-  TIMEOUT 1800)
+  TIMEOUT 600)
 
+af_add_program_tests(
+  evaluate_stops_tests PREPARED
+  SOURCES programs/evaluate_stops_test.cpp support/launched_job.cpp
+  LIBS af_register af_ranks
+  PROGRAMS af-evaluate af-precompute
+  LABELS programs mpi
+  TIMEOUT 600)
 
 # Of all programs: whoever builds these tests has every library of options.
 af_add_test(

@@ -29,9 +29,12 @@ af_add_mpi_test(
   LIBS af_precompute_build
   RANKS 1 2 3 4)
 
-add_test(NAME precompute_program COMMAND ${PROJECT_SOURCE_DIR}/tests/programs/precompute_program.sh
-                                         $<TARGET_FILE:af-precompute> ${MPIEXEC_EXECUTABLE} ${af_sanitized})
-set_tests_properties(precompute_program PROPERTIES LABELS mpi TIMEOUT 1800)
+foreach(section refusals spacing ranks budget memory corrections stops)
+  add_test(NAME precompute_program.${section}
+           COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/programs/precompute_program.sh $<TARGET_FILE:af-precompute> ${MPIEXEC_EXECUTABLE}
+                   ${section} ${af_sanitized})
+  set_tests_properties(precompute_program.${section} PROPERTIES LABELS mpi TIMEOUT 600)
+endforeach()
 
 add_test(NAME atlas_program COMMAND ${PROJECT_SOURCE_DIR}/tests/programs/atlas_program.sh
                                     ${PROJECT_BINARY_DIR}/bin ${MPIEXEC_EXECUTABLE})
