@@ -1,12 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 af_add_test(
   scan_test
-  SOURCES unit/evaluate/scan/simulated_scan.cpp
-          unit/evaluate/scan/calibration_distance.cpp
-          unit/evaluate/scan/fdk_test.cpp
-          unit/evaluate/scan/line_integrals_test.cpp
-          unit/evaluate/scan/scan_file_test.cpp
-          unit/evaluate/scan/scan_geometry_test.cpp
+  SOURCES unit/evaluate/scan/simulated_scan.cpp unit/evaluate/scan/calibration_distance.cpp
+          unit/evaluate/scan/fdk_test.cpp unit/evaluate/scan/line_integrals_test.cpp
+          unit/evaluate/scan/scan_file_test.cpp unit/evaluate/scan/scan_geometry_test.cpp
           unit/evaluate/scan/self_calibration_test.cpp
   LIBS af_evaluate_scan)
 af_add_program_tests(
