@@ -12,7 +12,8 @@ Usage: tests/run.sh [--fast] [--sanitize] [--sanitize-threads] [--skip-packages]
 Installs missing packages, builds everything in build/release and runs all tests with CTest, MPI tests on 1, 2, 3 and 4
 ranks. The last lines are CTest's summary; the exit code is 0 only when every test passed.
 
-  --fast            without the tests labelled physics or regression (minutes)
+  --fast            within three minutes after a change to one file: without real CTs (label physics), programs that run for long,
+                    unit tests of more than three seconds, and MPI on more than two ranks (label long)
   --sanitize        in build/sanitize, with the address and undefined-behaviour sanitizers; about an hour
   --sanitize-threads  in build/sanitize-threads, with the thread sanitizer, without the physics tests; takes long
   --skip-packages   do not look for missing packages
@@ -24,7 +25,7 @@ preset=release skip_packages=no
 ctest_options=()
 while (($# > 0)); do
   case "$1" in
-    --fast) ctest_options+=(--label-exclude 'physics|regression') ;;
+    --fast) ctest_options+=(--label-exclude 'physics|long') ;;
     --sanitize) preset=sanitize ;;
     --sanitize-threads) preset=sanitize-threads ;;
     --skip-packages) skip_packages=yes ;;

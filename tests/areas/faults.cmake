@@ -1,20 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-# Jobs that die. The tests share what undisturbed runs give.
+# Jobs that die.
 af_add_program_tests(
-  kill_matrix_tests
+  kill_matrix_tests PREPARED
   SOURCES programs/kill_matrix_test.cpp support/launched_job.cpp
   LIBS af_register
   PROGRAMS af-evaluate af-precompute af-inspect
   LABELS programs mpi
-  TIMEOUT 1800)
+  TIMEOUT 600)
 
 af_add_program_tests(
-  fault_tests
+  fault_tests PREPARED
   SOURCES programs/faults_test.cpp support/launched_job.cpp
   LIBS af_register
   PROGRAMS af-precompute af-inspect stopped_rank
   LABELS programs mpi
-  TIMEOUT 1800)
+  TIMEOUT 600)
 af_add_program_tests(
   output_lock_tests EACH_TEST
   SOURCES programs/output_locks_test.cpp support/launched_job.cpp

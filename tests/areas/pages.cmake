@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # The commands of our pages: one CTest entry per page that has some (tests/pages/page_commands.py).
 set(af_page_commands ${CMAKE_CURRENT_SOURCE_DIR}/pages/page_commands.py)
-add_test(NAME Pages.SayWhichCommandsAreRun COMMAND ${af_page_commands} --check ${PROJECT_SOURCE_DIR})
-set_tests_properties(Pages.SayWhichCommandsAreRun PROPERTIES LABELS checks TIMEOUT 60)
+add_test(NAME checks.pages COMMAND ${af_page_commands} --check ${PROJECT_SOURCE_DIR})
+set_tests_properties(checks.pages PROPERTIES LABELS checks TIMEOUT 60)
 file(GLOB af_pages CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR} ${PROJECT_SOURCE_DIR}/*.md ${PROJECT_SOURCE_DIR}/*/*.md
      ${PROJECT_SOURCE_DIR}/*/*/*.md)
 list(FILTER af_pages EXCLUDE REGEX "^build/")

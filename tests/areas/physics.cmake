@@ -4,11 +4,22 @@ set(af_default_ct ${CMAKE_CURRENT_BINARY_DIR}/default-ct/skull.mhd)
 add_test(NAME default_ct COMMAND ${PROJECT_SOURCE_DIR}/jobs/default-ct.sh ${af_default_ct})
 set_tests_properties(default_ct PROPERTIES LABELS physics FIXTURES_SETUP default_ct)
 
-af_add_test(physics_test LABEL physics TIMEOUT 300 FIXTURE default_ct SOURCES physics/ray_caster_itk_test.cpp LIBS af_ct af_xray af_study af_test_itk)
+af_add_test(
+  physics_test
+  SOURCES physics/ray_caster_itk_test.cpp
+  LIBS af_ct af_xray af_study af_test_itk
+  LABEL physics
+  TIMEOUT 300
+  FIXTURE default_ct)
 target_compile_definitions(physics_test PRIVATE AF_DEFAULT_CT_PATH="${af_default_ct}")
 
-af_add_test(shear_warp_accuracy_test LABEL physics TIMEOUT 300 FIXTURE default_ct
-            SOURCES physics/shear_warp_accuracy_test.cpp physics/caster_accuracy.cpp LIBS af_precompute_build af_study af_ranks)
+af_add_test(
+  shear_warp_accuracy_test
+  SOURCES physics/shear_warp_accuracy_test.cpp physics/caster_accuracy.cpp
+  LIBS af_precompute_build af_study af_ranks
+  LABEL physics
+  TIMEOUT 300
+  FIXTURE default_ct)
 target_compile_definitions(shear_warp_accuracy_test PRIVATE AF_DEFAULT_CT_PATH="${af_default_ct}")
 
 # The table of precompute/README.md, one row at a time.

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 af_add_program_tests(
-  register_program_tests
+  register_program_tests PREPARED
   SOURCES programs/register_program_test.cpp
   LIBS af_register
   PROGRAMS af-register af-drr af-precompute)

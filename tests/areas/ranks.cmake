@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-af_add_mpi_test(parallel_test SOURCES mpi/communicator_test.cpp mpi/work_queue_test.cpp mpi/work_watch_test.cpp RANKS 1 2 3 4)
+af_add_mpi_test(
+  parallel_test
+  SOURCES mpi/communicator_test.cpp mpi/work_queue_test.cpp mpi/work_watch_test.cpp
+  RANKS 1 2 3 4)
 # Apart: their last tests ask for a stop, which cannot be taken back.
 af_add_mpi_test(run_folder_test SOURCES mpi/run_folder_test.cpp LIBS af_ranks RANKS 1 2 4)
 af_add_mpi_test(resumable_items_test SOURCES mpi/resumable_items_test.cpp LIBS af_ranks RANKS 1 2 3 4)
 af_add_mpi_test(shared_inputs_test SOURCES mpi/shared_inputs_test.cpp LIBS af_study RANKS 1 2 3 4)
 
-af_add_test(
-  run_test
-  SOURCES unit/ranks/progress_journal_test.cpp unit/ranks/provenance_test.cpp
-  LIBS af_ranks)
+af_add_test(run_test SOURCES unit/ranks/progress_journal_test.cpp unit/ranks/provenance_test.cpp LIBS af_ranks)

@@ -1,32 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
 af_add_test(
   register_tests
-  SOURCES unit/register/similarity/mutual_information_test.cpp
-          unit/register/similarity/cross_correlation_test.cpp
-          unit/register/similarity/similarity_measures_test.cpp
-          unit/register/optimizer/best_neighbor_search_test.cpp
-          unit/register/optimizer/optimizers_test.cpp
-          unit/register/problem/stage_view_test.cpp
-          unit/register/problem/fiducial_mask_test.cpp
-          unit/register/problem/silhouette_test.cpp
-          unit/register/method/method_options_test.cpp
-          unit/register/problem/parameter_scaling_test.cpp
-          unit/register/problem/multi_view_objective_test.cpp
-          unit/register/method/correction_test.cpp
-          unit/register/method/registration_test.cpp
-          unit/register/verdict/verdict_test.cpp
-          unit/register/verdict/pose_covariance_test.cpp
-          unit/register/verdict/uncertainty_estimator_test.cpp
+  SOURCES unit/register/similarity/mutual_information_test.cpp unit/register/similarity/cross_correlation_test.cpp
+          unit/register/similarity/similarity_measures_test.cpp unit/register/optimizer/best_neighbor_search_test.cpp
+          unit/register/optimizer/optimizers_test.cpp unit/register/problem/stage_view_test.cpp
+          unit/register/problem/fiducial_mask_test.cpp unit/register/problem/silhouette_test.cpp
+          unit/register/method/method_options_test.cpp unit/register/problem/parameter_scaling_test.cpp
+          unit/register/problem/multi_view_objective_test.cpp unit/register/method/correction_test.cpp
+          unit/register/method/registration_test.cpp unit/register/verdict/verdict_test.cpp
+          unit/register/verdict/pose_covariance_test.cpp unit/register/verdict/uncertainty_estimator_test.cpp
   LIBS af_register_verdict af_geometry af_files)
 af_add_test(
   register_program_unit_tests
-  SOURCES unit/register/register_options_test.cpp unit/register/kept_fields_test.cpp unit/register/results/registration_results_test.cpp
-          unit/register/results/slicer_folder_test.cpp
+  SOURCES unit/register/register_options_test.cpp unit/register/kept_fields_test.cpp
+          unit/register/results/registration_results_test.cpp unit/register/results/slicer_folder_test.cpp
   LIBS af_register)
 af_add_mpi_test(register_mpi_tests SOURCES mpi/multi_start_test.cpp LIBS af_register RANKS 1 2 3 4)
 # Its own operator new belongs into a file of its own.
 set_source_files_properties(support/counted_allocations.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 af_add_test(
   allocation_test
-  SOURCES unit/register/allocation_test.cpp unit/drr/small_fields.cpp support/counted_allocations.cpp
+  SOURCES support/counted_allocations.cpp unit/drr/small_fields.cpp unit/register/allocation_test.cpp
   LIBS af_register_verdict)

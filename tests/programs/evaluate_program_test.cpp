@@ -1,16 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // af-evaluate as a user meets it: files, the same rows on every rank count, exit codes, messages.
-#include <chrono>
 #include <cmath>
-#include <csignal>
 #include <cstdlib>
 #include <filesystem>
-#include <functional>
 #include <nlohmann/json.hpp>
-#include <sstream>
 #include <string>
-#include <sys/resource.h>
-#include <thread>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -19,12 +13,9 @@
 #include "files/csv_table.h"
 #include "files/output_file.h"
 #include "files/output_lock.h"
-#include "programs/small_study.h"
-#include "ranks/stop_request.h"
+#include "programs/evaluated_study.h"
 #include "study/pose_file.h"
 #include "study/study_file.h"
-#include "support/kept_records.h"
-#include "support/launched_job.h"
 #include "support/run_program.h"
 #include "support/test_paths.h"
 
@@ -47,61 +38,12 @@ void write_study_with_fiducials(const std::filesystem::path& folder) {
   write_text_file(folder / "with-fiducials.toml", study_to_toml(study, folder));
 }
 
-/// One study and its fields for all tests of this file.
-class EvaluateProgram : public testing::Test {
+class EvaluateProgram : public test::EvaluatedStudy {
  protected:
   static void SetUpTestSuite() {
-    setenv("OMPI_ALLOW_RUN_AS_ROOT", "1", 1);
-    setenv("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1", 1);
-    setenv("OMPI_MCA_hwloc_base_binding_policy", "none", 1);
-    folder_ = new test::ScratchFolder();
-    test::write_small_study(folder_->path());
-    write_study_with_fiducials(folder_->path());
-    for (const char* camera : {"AP", "LAT"}) {
-      const test::ProgramRun run = test::run_command(
-          std::string(AF_PROGRAM_FOLDER "/af-precompute --study ") + path("study.toml") +
-          " --camera " + camera +
-          " --max-rotation-deg 15 --max-translation-mm 12 --uv-nodes 20 --st-nodes 64"
-          " --codewords 512 -o " +
-          path(std::string(camera) + ".af.h5"));
-      ASSERT_EQ(run.exit_code, 0) << run.output;
-    }
+    set_up([] { write_study_with_fiducials(path("")); });
   }
-  static void TearDownTestSuite() { delete folder_; }
-
-  static std::string path(const std::string& name) { return (*folder_ / name).string(); }
-  static std::string text(const std::string& name) { return read_text_file(*folder_ / name); }
-  static std::string fields() {
-    return " --field AP=" + path("AP.af.h5") + " --field LAT=" + path("LAT.af.h5") + " ";
-  }
-  static test::ProgramRun evaluate(const std::string& arguments, int ranks = 0) {
-    const std::string launcher =
-        ranks == 0 ? ""
-                   : std::string(AF_MPIEXEC " --oversubscribe -n ") + std::to_string(ranks) + " ";
-    return test::run_command(launcher + AF_PROGRAM_FOLDER "/af-evaluate " + arguments);
-  }
-  /// The words of such a command under mpirun.
-  static std::vector<std::string> on_ranks(int ranks, const std::string& arguments) {
-    std::vector<std::string> words = {AF_MPIEXEC,
-                                      "--oversubscribe",
-                                      "-n",
-                                      std::to_string(ranks),
-                                      AF_PROGRAM_FOLDER "/af-evaluate"};
-    std::istringstream rest(arguments);
-    for (std::string word; rest >> word;) words.push_back(word);
-    return words;
-  }
-  /// registrations.csv without its last column, the timings.
-  static std::string rows_without_seconds(const std::string& folder) {
-    const CsvTable table = CsvTable::read(path(folder + "/registrations.csv"));
-    EXPECT_EQ(table.columns().back(), "seconds");
-    std::string result;
-    for (std::size_t i = 0; i < table.row_count(); ++i)
-      for (const std::string& column : table.columns())
-        if (column != "seconds") result += table.text(i, column) + ",";
-    return result;
-  }
-  /// Once for all tests: a run of every kind, and a registration whose searches end too early to
+  /// Once a process: a run of every kind, and a registration whose searches end too early to
   /// succeed, with a report of all.
   static void make_runs_of_every_kind() {
     if (std::filesystem::exists(path("runs/report.html"))) return;
@@ -125,14 +67,12 @@ class EvaluateProgram : public testing::Test {
       ASSERT_EQ(run.exit_code, 0) << run.output;
     }
   }
-  static void expect_refused(const test::ProgramRun& run, int exit_code, const std::string& part) {
-    EXPECT_EQ(run.exit_code, exit_code) << run.output;
-    EXPECT_THAT(run.output, HasSubstr(part));
-  }
-
- private:
-  static inline test::ScratchFolder* folder_ = nullptr;
 };
+
+TEST_F(EvaluateProgram, IsPrepared) {
+  for (const char* name : {"with-fiducials.toml", "AP.af.h5", "LAT.af.h5"})
+    EXPECT_TRUE(std::filesystem::exists(path(name))) << name;
+}
 
 TEST_F(EvaluateProgram, ComparesImagesAlikeOnAnyRankCountAndVectorWidth) {
   const std::string arguments = "image-quality --field " + path("AP.af.h5") + " --ct " +
@@ -209,60 +149,6 @@ TEST_F(EvaluateProgram, RegistersAlikeOnAnyRankCount) {
   EXPECT_EQ(notes.count(first_case + ": xray AP"), 1U) << "as af-register: " << notes.dump();
 }
 
-/// How a run is cut short while its ranks stand still.
-struct Cut {
-  const char* name;
-  std::function<void(test::LaunchedJob& job, const std::vector<pid_t>& ranks)> cut;
-  bool is_stop;  ///< exit code 75; otherwise any but 0
-};
-
-void send(const std::vector<pid_t>& processes, int signal) {
-  for (const pid_t process : processes) kill(process, signal);
-}
-
-const Cut kCuts[] = {{"usr1", [](auto& job, const auto&) { kill(job.launcher(), SIGUSR1); }, true},
-                     {"term",
-                      [](auto& job, const auto& ranks) {
-                        kill(job.launcher(), SIGTERM);
-                        // Open MPI wakes the ranks a second before it passes the signal on.
-                        while (!job.has_ended()) {
-                          send(ranks, SIGSTOP);
-                          std::this_thread::sleep_for(std::chrono::milliseconds(20));
-                        }
-                      },
-                      false},
-                     {"rank", [](auto&, const auto& ranks) { kill(ranks.back(), SIGKILL); }, false},
-                     {"all",
-                      [](auto& job, const auto& ranks) {
-                        kill(job.launcher(), SIGKILL);
-                        send(ranks, SIGKILL);
-                      },
-                      false}};
-
-std::uint64_t record_bytes(const std::filesystem::path& progress) {
-  std::uint64_t bytes = 0;
-  std::error_code gone;
-  for (const auto& entry : std::filesystem::directory_iterator(progress, gone))
-    if (entry.path().extension() == ".records") bytes += entry.file_size(gone);
-  return bytes;
-}
-
-/// Waits until some registrations are kept, holds the ranks there, so that they cannot be faster
-/// than the cut, and cuts the run short. Its exit code, once nothing of it is left.
-int exit_code_when_cut(const Cut& cut,
-                       const std::vector<std::string>& command,
-                       const std::string& progress,
-                       const std::string& said) {
-  test::LaunchedJob job(command, said);
-  EXPECT_TRUE(job.wait_until([&] { return record_bytes(progress) > 4000; }));
-  const std::vector<pid_t> ranks = job.ranks();
-  send(ranks, SIGSTOP);
-  cut.cut(job, ranks);
-  std::this_thread::sleep_for(std::chrono::milliseconds(300));
-  send(ranks, SIGCONT);
-  return job.wait(std::chrono::minutes(5));
-}
-
 TEST_F(EvaluateProgram, RegistersCasesThatShareFieldsAsItDoesEachAlone) {
   Study study = read_study(path("study.toml"));
   for (StudyView& view : study.cases.front().views) view.field = path(view.camera + ".af.h5");
@@ -302,40 +188,17 @@ TEST_F(EvaluateProgram, TakesStartsWithoutACaseWhereOneCaseIsChosen) {
   expect_refused(evaluate(run + path("both-twins")), 3, "needed with several cases");
 }
 
-TEST_F(EvaluateProgram, GoesOnAfterAStopOrAKillOnAnotherRankCount) {
-  const std::string arguments = "registration --study " + path("study.toml") + fields() +
-                                "--preset paper --starts-per-interval 25 -o ";
-  ASSERT_EQ(evaluate(arguments + path("whole"), 2).exit_code, 0);
-  const std::string expected = rows_without_seconds("whole");
-  for (const int ranks : {1, 2, 4})
-    for (const Cut& cut : kCuts) {
-      const std::string out = path(std::string(cut.name) + std::to_string(ranks));
-      SCOPED_TRACE(out);
-      const std::vector<std::string> command = on_ranks(ranks, arguments + out);
-      const int exit_code = exit_code_when_cut(cut, command, out + ".progress", path("said.txt"));
-      EXPECT_EQ(exit_code == 75, cut.is_stop) << exit_code << text("said.txt");
-      EXPECT_NE(exit_code, 0) << text("said.txt");
-      EXPECT_FALSE(std::filesystem::exists(out + "/summary.json"));
-      if (ranks == 1) expect_refused(evaluate(arguments + out + " --seed 2", 1), 3, "begun with 1");
-      const std::uint64_t kept = test::kept_records(out + ".progress");
-      EXPECT_GT(kept, 0U);
-      const test::ProgramRun resumed = evaluate(arguments + out, ranks % 3 + 1);
-      ASSERT_EQ(resumed.exit_code, 0) << resumed.output;
-      EXPECT_THAT(resumed.output, HasSubstr("goes on after " + std::to_string(kept) + " of 200"));
-      EXPECT_EQ(rows_without_seconds(std::filesystem::path(out).filename()), expected);
-      EXPECT_FALSE(std::filesystem::exists(out + ".progress"));
-    }
-}
-
 TEST_F(EvaluateProgram, ASecondRunThatWritesTheSameIsRefused) {
-  make_runs_of_every_kind();
+  const std::string registration = "registration --study " + path("study.toml") + fields();
+  const std::string run = path("run");
+  ASSERT_EQ(evaluate(registration + "--intervals 2 --starts-per-interval 2 -o " + run).exit_code,
+            0);
   const OutputLock folder_lock(path("taken"));
   const OutputLock file_lock(path("taken.md"));
   const OutputLock page_lock(path("taken.html"));
   const OutputLock study_lock(path("taken.toml"));
-  const std::string run = path("runs/registration");
   const std::vector<std::string> commands = {
-      "registration --study " + path("study.toml") + fields() + " -o " + path("taken"),
+      registration + " -o " + path("taken"),
       "similarity-curves --study " + path("study.toml") + fields() + " -o " + path("taken"),
       "image-quality --field " + path("LAT.af.h5") + " --ct " + path("ct.nii.gz") + " -o " +
           path("taken"),
@@ -348,80 +211,6 @@ TEST_F(EvaluateProgram, ASecondRunThatWritesTheSameIsRefused) {
     expect_refused(evaluate(arguments),
                    3,
                    "another job is writing it: process " + std::to_string(getpid()) + " on ");
-}
-
-/// Registrations that last some seconds, under mpirun; what it says goes to said.txt.
-class BrokenRegistrations : public EvaluateProgram {
- protected:
-  static std::string arguments(const std::string& folder) {
-    return "registration --study " + path("study.toml") + fields() +
-           "--preset paper --starts-per-interval 25 -o " + path(folder);
-  }
-  static std::vector<std::string> on_two_ranks(const std::string& folder) {
-    return on_ranks(2, arguments(folder) + " --stall-minutes 0.1");
-  }
-  static bool has_rows(const std::string& folder) {
-    return record_bytes(path(folder + ".progress")) > 0;
-  }
-  static void expect_going_on(const std::string& folder) {
-    const test::ProgramRun run = evaluate(arguments(folder), 2);
-    EXPECT_EQ(run.exit_code, 0) << run.output;
-    EXPECT_THAT(run.output, HasSubstr("goes on after"));
-    EXPECT_EQ(CsvTable::read(path(folder + "/registrations.csv")).row_count(), 200U);
-  }
-  static constexpr std::chrono::seconds kEndsWithin{300};
-};
-
-TEST_F(BrokenRegistrations, AStoppedRankIsNamedWithItsStartAndTheJobEnded) {
-  test::LaunchedJob job(on_two_ranks("stalled"), path("said.txt"));
-  ASSERT_TRUE(job.wait_until([] { return has_rows("stalled"); }));
-  ASSERT_FALSE(job.ranks().empty());
-  kill(job.ranks().back(), SIGSTOP);
-  EXPECT_EQ(job.wait(kEndsWithin), 75) << text("said.txt");
-  // Wherever it was: at a start, or waiting for the other.
-  EXPECT_THAT(text("said.txt"),
-              testing::ContainsRegex(
-                  "rank [01] on .*(registrations: item [0-9]+ .[0-9]+ of 200.: no progress for|"
-                  "is stopped: has not run for)"));
-  expect_going_on("stalled");
-}
-
-TEST_F(BrokenRegistrations, AFullDiskNamesTheFileAndWhatIsFinishedIsKept) {
-  test::LaunchedJob job(on_two_ranks("full"), path("said.txt"));
-  ASSERT_TRUE(job.wait_until([] { return has_rows("full"); }));
-  const rlimit limit{6000, 6000};  // some twenty rows
-  for (const pid_t process : job.ranks())
-    EXPECT_EQ(prlimit(process, RLIMIT_FSIZE, &limit, nullptr), 0);
-  EXPECT_EQ(job.wait(kEndsWithin), 4) << text("said.txt");
-  EXPECT_THAT(text("said.txt"), HasSubstr(".records: cannot be written: File too large"));
-  expect_going_on("full");
-}
-
-TEST_F(EvaluateProgram, EveryStageThatTakesLongGoesOnAfterStops) {
-  const std::string field = "image-quality --field " + path("LAT.af.h5") + " --ct " +
-                            path("ct.nii.gz") + " --pose-count 40 --split-loss-poses 2 -o ";
-  const std::string curves = "similarity-curves --study " + path("study.toml") + fields() +
-                             "--half-width-mm 2 --half-width-deg 2 -o ";
-  struct Stage {
-    std::string arguments;
-    const char* table;
-  };
-  for (const auto& [arguments, table] : {Stage{field, "image-quality.csv"},
-                                         Stage{field, "loss-split.csv"},
-                                         Stage{curves, "similarity-curves.csv"}}) {
-    SCOPED_TRACE(table);
-    const std::string name = std::string(table) + "-";
-    ASSERT_EQ(evaluate(arguments + path(name + "whole")).exit_code, 0);
-    const std::string stopped = path(name + "stopped");
-    expect_refused(evaluate(arguments + stopped + test::kStopAtOnce, 2), 75, "saved: run the same");
-    EXPECT_FALSE(std::filesystem::exists(stopped + "/summary.json"));
-    expect_refused(evaluate(arguments + stopped + " --step-mm 0.7"), 3, "begun with");
-    const test::ProgramRun last =
-        test::run_until_done(AF_PROGRAM_FOLDER "/af-evaluate " + arguments + stopped);
-    ASSERT_EQ(last.exit_code, 0) << last.output;
-    EXPECT_EQ(text(name + "stopped/" + table), text(name + "whole/" + table));
-    EXPECT_FALSE(std::filesystem::exists(stopped + ".progress"));
-  }
 }
 
 TEST_F(EvaluateProgram, MeasuresPosesOfAnotherProgramLikeItsOwn) {

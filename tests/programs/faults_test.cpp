@@ -37,10 +37,15 @@ class Faults : public testing::Test {
   static void SetUpTestSuite() {
     test::prepare_slow_jobs();
     folder_ = new test::ScratchFolder();
-    test::write_small_study(folder_->path());
-    const test::ProgramRun run = test::run_command(words(precompute(kRanks)));
-    ASSERT_EQ(run.exit_code, 0) << run.output;
-    payload_ = payload();
+    const fs::path payload_file = *folder_ / "payload.txt";
+    test::prepare_once(folder_->path(), [&] {
+      test::write_small_study(folder_->path());
+      const test::ProgramRun run = test::run_command(words(precompute(kRanks)));
+      ASSERT_EQ(run.exit_code, 0) << run.output;
+      write_text_file(payload_file, payload());
+      fs::remove(field());
+    });
+    payload_ = read_text_file(payload_file);
   }
   static void TearDownTestSuite() { delete folder_; }
   void SetUp() override { fs::remove(field()); }
@@ -104,6 +109,10 @@ class Faults : public testing::Test {
   static inline test::ScratchFolder* folder_ = nullptr;
   static inline std::string payload_;
 };
+
+TEST_F(Faults, IsPrepared) {
+  EXPECT_TRUE(fs::exists(study_file()));
+}
 
 TEST_F(Faults, TimeThatIsOverStopsTheJobByItself) {
   // 1.1 s after the start of each rank: casting alone takes longer.

@@ -11,13 +11,14 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
-#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <ostream>
 #include <random>
 #include <set>
 #include <string>
 #include <thread>
+#include <tuple>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -53,6 +54,14 @@ const char* name_of(Stage stage) {
 const char* name_of(Cut cut) {
   constexpr std::array names = {"SIGUSR1", "SIGTERM", "SIGKILL of one rank", "SIGKILL of all"};
   return names[static_cast<std::size_t>(cut)];
+}
+
+void PrintTo(Stage stage, std::ostream* out) {
+  *out << name_of(stage);
+}
+
+void PrintTo(Cut cut, std::ostream* out) {
+  *out << name_of(cut);
 }
 
 std::uint64_t setting(const char* variable, std::uint64_t otherwise) {
@@ -119,9 +128,12 @@ struct Plan {
 class KillMatrix : public testing::Test {
  protected:
   static void SetUpTestSuite() {
+    std::cout << "AF_KILL_SEED=" << setting("AF_KILL_SEED", 1) << '\n';
     test::prepare_slow_jobs();
     folder_ = new test::ScratchFolder();
-    test::write_small_study(folder_->path());
+    test::prepare_once(folder_->path(), run_undisturbed);
+    undisturbed_ = json::parse(read_text_file(path("undisturbed.json")));
+    rows_ = rows_without_seconds(path("whole"));
   }
   static void TearDownTestSuite() { delete folder_; }
 
@@ -156,8 +168,16 @@ class KillMatrix : public testing::Test {
     return json::parse(run.output)[0]["facts"];
   }
 
-  /// An undisturbed run: its payload, and where its stages lie.
-  static StageBytes measure(int ranks) {
+  /// Of each rank count: the payload, and where the stages lie. Of registrations: the rows.
+  static void run_undisturbed() {
+    test::write_small_study(folder_->path());
+    make_fields();
+    undisturbed_["registration_bytes"] = measure_registration();
+    for (const int ranks : kRankCounts) measure(ranks);
+    write_text_file(path("undisturbed.json"), undisturbed_.dump());
+  }
+
+  static void measure(int ranks) {
     const fs::path field = path("whole.af.h5");
     const fs::path progress = field.string() + ".progress";
     StageBytes bytes;
@@ -171,17 +191,17 @@ class KillMatrix : public testing::Test {
       return false;
     });
     EXPECT_EQ(job.wait(kEndsWithin), 0) << read_text_file(path("output.txt"));
-    const std::string payload = inspected(field)["payload_sha256"];
-    if (payload_.empty()) payload_ = payload;
-    EXPECT_EQ(payload, payload_);
+    const json payload = inspected(field)["payload_sha256"];
+    EXPECT_EQ(payload, undisturbed_.value("payload", payload));
+    undisturbed_["payload"] = payload;
+    undisturbed_["stages"][std::to_string(ranks)] = {
+        bytes.all_cast, bytes.all_trained, bytes.all_encoded};
     fs::remove(field);
-    return bytes;
   }
 
-  static const StageBytes& bytes_on(int ranks) {
-    auto found = bytes_.find(ranks);
-    if (found == bytes_.end()) found = bytes_.emplace(ranks, measure(ranks)).first;
-    return found->second;
+  static StageBytes bytes_on(int ranks) {
+    const json& bytes = undisturbed_["stages"][std::to_string(ranks)];
+    return {bytes[0], bytes[1], bytes[2]};
   }
 
   double fraction() { return std::uniform_real_distribution<>(0.0, 1.0)(random_); }
@@ -189,7 +209,8 @@ class KillMatrix : public testing::Test {
   /// Waits for a moment of a stage, drawn uniformly over its finished work, and a little longer:
   /// moments within a unit are hit, too.
   bool reach(const Plan& plan, test::LaunchedJob& job, const fs::path& progress) {
-    const StageBytes& stages = bytes_on(plan.ranks);
+    const StageBytes stages = bytes_on(plan.ranks);
+    const std::uint64_t registration_bytes = undisturbed_["registration_bytes"];
     const double drawn = fraction();
     const auto part = [&](std::uint64_t begin, std::uint64_t end) {
       return begin + static_cast<std::uint64_t>(drawn * static_cast<double>(end - begin));
@@ -204,7 +225,7 @@ class KillMatrix : public testing::Test {
         case Stage::Encode:
           return now.units > part(stages.all_cast, stages.all_encoded);
         case Stage::Evaluate:
-          return now.training > part(0, registration_bytes_);
+          return now.training > part(0, registration_bytes);
       }
       return false;
     });
@@ -258,7 +279,7 @@ class KillMatrix : public testing::Test {
     test::LaunchedJob job(precompute(plan.other_ranks, field), path("output.txt"));
     ASSERT_EQ(job.wait(kEndsWithin), 0) << read_text_file(path("output.txt"));
     const json facts = inspected(field);
-    EXPECT_EQ(facts["payload_sha256"], payload_);
+    EXPECT_EQ(facts["payload_sha256"], undisturbed_["payload"]);
     const json details = facts["provenance"]["details"];
     EXPECT_EQ(details["units_resumed"], kept.cast.size());
     EXPECT_EQ(details["training_iterations_resumed"], kept.iterations);
@@ -293,14 +314,13 @@ class KillMatrix : public testing::Test {
     if (is_evaluation) {
       EXPECT_EQ(rows_without_seconds(output), rows_);
     } else {
-      EXPECT_EQ(inspected(output)["payload_sha256"], payload_);
+      EXPECT_EQ(inspected(output)["payload_sha256"], undisturbed_["payload"]);
     }
     EXPECT_FALSE(fs::exists(output.string() + ".progress"));
   }
 
   static void make_fields() {
     for (const std::string camera : {"AP", "LAT"}) {
-      if (fs::exists(path(camera + ".af.h5"))) continue;
       const test::ProgramRun run = test::run_command(
           std::string(AF_PROGRAM_FOLDER
                       "/af-precompute --max-rotation-deg 15 "
@@ -320,17 +340,16 @@ class KillMatrix : public testing::Test {
     return result;
   }
 
-  static void measure_registration() {
-    if (registration_bytes_ > 0) return;
-    make_fields();
+  /// Bytes of all rows, of which a run leaves whole/.
+  static std::uint64_t measure_registration() {
+    std::uint64_t bytes = 0;
     test::LaunchedJob job(registration(2, path("whole")), path("output.txt"));
     job.wait_until([&] {
-      registration_bytes_ =
-          std::max(registration_bytes_, progress_bytes(path("whole.progress")).training);
+      bytes = std::max(bytes, progress_bytes(path("whole.progress")).training);
       return false;
     });
-    ASSERT_EQ(job.wait(kEndsWithin), 0) << read_text_file(path("output.txt"));
-    rows_ = rows_without_seconds(path("whole"));
+    EXPECT_EQ(job.wait(kEndsWithin), 0) << read_text_file(path("output.txt"));
+    return bytes;
   }
 
   bool cut_registration(const Plan& plan, const fs::path& folder) {
@@ -362,7 +381,6 @@ class KillMatrix : public testing::Test {
                  std::to_string(plan.ranks) + " ranks, then " + std::to_string(plan.other_ranks));
     const fs::path output = path("cut-" + std::to_string(cuts_made_) + ".out");
     const bool is_evaluation = plan.stage == Stage::Evaluate;
-    if (is_evaluation) measure_registration();
     constexpr int kMostTries = 10;
     for (int i = 0; i < kMostTries; ++i) {
       fs::remove_all(output);
@@ -382,7 +400,7 @@ class KillMatrix : public testing::Test {
       fs::remove_all(output);
       return;
     }
-    const StageBytes& stages = bytes_on(plan.ranks);
+    const StageBytes stages = bytes_on(plan.ranks);
     ADD_FAILURE() << "the run was over too early " << kMostTries
                   << " times; bytes of its stages: " << stages.all_cast << ", "
                   << stages.all_trained << ", " << stages.all_encoded;
@@ -394,7 +412,13 @@ class KillMatrix : public testing::Test {
     return other;
   }
 
-  std::mt19937_64 random_{setting("AF_KILL_SEED", 1)};
+  /// Draws of its own for each plan, so that plans can be gone through one by one.
+  void draw_for(std::uint64_t plan) {
+    constexpr std::uint64_t kMostPlans = 100'000;
+    random_.seed(setting("AF_KILL_SEED", 1) * kMostPlans + plan);
+  }
+
+  std::mt19937_64 random_;
   std::uint64_t cuts_made_ = 0;
   std::uint64_t units_kept_ = 0;
   std::uint64_t iterations_kept_ = 0;
@@ -403,40 +427,51 @@ class KillMatrix : public testing::Test {
 
  private:
   static inline test::ScratchFolder* folder_ = nullptr;
-  static inline std::string payload_;
-  static inline std::map<int, StageBytes> bytes_;
+  static inline json undisturbed_;
   static inline std::string rows_;
-  static inline std::uint64_t registration_bytes_ = 0;
 };
 
-/// Every stage with every cut; the rank counts take turns.
-TEST_F(KillMatrix, GoesOnToTheSameBytesOnAnotherRankCount) {
-  std::cout << "AF_KILL_SEED=" << setting("AF_KILL_SEED", 1) << '\n';
-  std::size_t turn = random_() % kRankCounts.size();
-  for (const Stage stage : kCastTrainEncode)
-    for (const Cut cut : kCuts) {
-      const int ranks = kRankCounts[turn++ % kRankCounts.size()];
-      go_through({stage, cut, ranks, other_than(ranks), std::nullopt});
-    }
+TEST_F(KillMatrix, IsPrepared) {
+  for (const char* name : {"AP.af.h5", "LAT.af.h5", "whole", "undisturbed.json"})
+    EXPECT_TRUE(fs::exists(path(name))) << name;
 }
 
-/// Every kind of damage, or AF_KILLS times; stages, cuts and rank counts are drawn.
-TEST_F(KillMatrix, MendsOrRefusesDamagedProgress) {
-  std::cout << "AF_KILL_SEED=" << setting("AF_KILL_SEED", 1) << '\n';
+class KillMatrixOfCuts : public KillMatrix,
+                         public testing::WithParamInterface<std::tuple<Stage, Cut>> {};
+
+/// Every stage with every cut; the rank counts take turns.
+TEST_P(KillMatrixOfCuts, GoesOnToTheSameBytesOnAnotherRankCount) {
+  const auto [stage, cut] = GetParam();
+  const auto turn = static_cast<std::size_t>(stage) * kCuts.size() + static_cast<std::size_t>(cut);
+  draw_for(turn);
+  const int ranks = kRankCounts[(setting("AF_KILL_SEED", 1) + turn) % kRankCounts.size()];
+  go_through({stage, cut, ranks, other_than(ranks), std::nullopt});
+}
+INSTANTIATE_TEST_SUITE_P(All,
+                         KillMatrixOfCuts,
+                         testing::Combine(testing::ValuesIn(kCastTrainEncode),
+                                          testing::ValuesIn(kCuts)));
+
+class KillMatrixOfDamages : public KillMatrix, public testing::WithParamInterface<test::Damage> {};
+
+/// Every kind of damage, or of AF_KILLS its share; stages, cuts and rank counts are drawn.
+TEST_P(KillMatrixOfDamages, MendsOrRefusesDamagedProgress) {
   constexpr std::size_t kStages = 4;
   const std::uint64_t kills = setting("AF_KILLS", test::kDamages.size());
-  const std::uint64_t turn = random_() % kStages;
-  for (std::uint64_t i = 0; i < kills && !HasFailure(); ++i) {
+  for (auto i = static_cast<std::uint64_t>(GetParam()); i < kills && !HasFailure();
+       i += test::kDamages.size()) {
+    draw_for(i);
     const int ranks = kRankCounts[random_() % kRankCounts.size()];
-    go_through({static_cast<Stage>((turn + i) % kStages),
+    go_through({static_cast<Stage>((setting("AF_KILL_SEED", 1) + i) % kStages),
                 kCuts[random_() % kCuts.size()],
                 ranks,
                 other_than(ranks),
-                test::kDamages[i % test::kDamages.size()]});
+                GetParam()});
     std::cout << cuts_made_ << " runs cut short and damaged, " << refusals_ << " refused"
               << std::endl;
   }
 }
+INSTANTIATE_TEST_SUITE_P(All, KillMatrixOfDamages, testing::ValuesIn(test::kDamages));
 
 /// AF_KILLS times: stages, cuts and rank counts in turn, so that each of the 48 comes up.
 TEST_F(KillMatrix, LosesNothingOverManyKills) {
@@ -444,6 +479,7 @@ TEST_F(KillMatrix, LosesNothingOverManyKills) {
   if (kills == 0) GTEST_SKIP() << "AF_KILLS=100 asks for it";
   constexpr std::size_t kStages = 4;
   for (std::uint64_t i = 0; i < kills && !HasFailure(); ++i) {
+    draw_for(i);
     const int ranks = kRankCounts[i % kRankCounts.size()];
     const Cut cut = kCuts[i / kRankCounts.size() % kCuts.size()];
     const auto stage = static_cast<Stage>(i / (kRankCounts.size() * kCuts.size()) % kStages);

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <ostream>
 #include <random>
 #include <string>
 #include <sys/stat.h>
@@ -27,6 +28,10 @@ inline const char* name_of(Damage damage) {
   constexpr std::array names = {
       "flipped bytes", "cut off", "swapped", "deleted", "a folder", "a pipe", "a link"};
   return names[static_cast<std::size_t>(damage)];
+}
+
+inline void PrintTo(Damage damage, std::ostream* out) {
+  *out << name_of(damage);
 }
 
 /// The files of a folder, by name: the same draw finds the same one.

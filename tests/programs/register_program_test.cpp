@@ -34,8 +34,10 @@ class ProgramTest : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     study_folder = new test::ScratchFolder();
-    test::write_small_study(study_folder->path());
-    make_fields("", "--uv-nodes 24");
+    test::prepare_once(study_folder->path(), [] {
+      test::write_small_study(study_folder->path());
+      make_fields("", "--uv-nodes 24");
+    });
   }
   static void TearDownTestSuite() { delete study_folder; }
 
@@ -79,6 +81,11 @@ class ProgramTest : public testing::Test {
 constexpr double kFieldTreMm = 1.0;
 /// See registration_test.cpp: the X-rays are this very ray caster's DRRs.
 constexpr double kRayCastTreMm = 0.5;
+
+TEST_F(ProgramTest, IsPrepared) {
+  for (const char* name : {"study.toml", "AP.af.h5", "LAT.af.h5"})
+    EXPECT_TRUE(fs::exists(path(name))) << name;
+}
 
 class RegisterProgram : public ProgramTest {};
 

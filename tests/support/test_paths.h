@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 
 namespace af::test {
@@ -20,5 +21,11 @@ class ScratchFolder {
  private:
   std::filesystem::path path_;
 };
+
+/// Fills a folder with what the tests of a program share. Only the first call of a process has it
+/// made, by `prepare`, and keeps a copy, from which the others fill theirs. Under CTest the entry
+/// NAME.prepared of the program keeps the copy (AF_PREPARE_INTO), and those of its tests take it
+/// (AF_PREPARED_IN).
+void prepare_once(const std::filesystem::path& folder, const std::function<void()>& prepare);
 
 }  // namespace af::test

@@ -5,7 +5,7 @@
 #
 #   atlas_program.sh FOLDER_OF_PROGRAMS MPIEXEC
 set -euo pipefail
-# shellcheck source=tests/checks/body_ct.sh
+# shellcheck source=tests/programs/body_ct.sh
 . "$(dirname "$0")/body_ct.sh"
 
 programs=$1

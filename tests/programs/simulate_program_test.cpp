@@ -2,10 +2,8 @@
 // The program af-simulate as people run it.
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <fstream>
 #include <string>
-#include <sys/wait.h>
 
 #include <gtest/gtest.h>
 
@@ -18,6 +16,7 @@
 #include "study/rig_file.h"
 #include "study/study_file.h"
 #include "study/xray_reader.h"
+#include "support/run_program.h"
 #include "support/test_paths.h"
 #include "xray/image_file.h"
 
@@ -30,18 +29,16 @@ const std::string coarse = "--phantom spine --phantom-voxel-mm 4 ";
 
 class AfSimulate : public ::testing::Test {
  protected:
-  /// Exit code of the program; its messages go to a file.
+  /// Exit code of the program; log() has what it printed.
   int run(const std::string& arguments, const std::string& program = "af-simulate") {
-    const std::string command =
-        AF_PROGRAM_FOLDER "/" + program + " " + arguments + " > '" + log_path().string() + "' 2>&1";
-    const int status = std::system(command.c_str());
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    last_run_ = test::run_command(AF_PROGRAM_FOLDER "/" + program + " " + arguments);
+    return last_run_.exit_code;
   }
-  [[nodiscard]] fs::path log_path() const { return scratch_ / "log.txt"; }
-  std::string log() { return read_text_file(log_path()); }
+  [[nodiscard]] std::string log() const { return last_run_.output; }
   std::string folder(const std::string& name) { return "-o '" + (scratch_ / name).string() + "'"; }
 
   test::ScratchFolder scratch_;
+  test::ProgramRun last_run_;
 };
 
 TEST_F(AfSimulate, MakesAStudyThatReadsBack) {
