@@ -11,7 +11,6 @@
 #include "base/file_name.h"
 #include "base/named_rows.h"
 #include "base/toml_text.h"
-#include "files/output_file.h"
 #include "files/toml_reader.h"
 #include "geometry/fiducial_registration.h"
 #include "geometry/target_box.h"
