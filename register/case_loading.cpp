@@ -2,15 +2,16 @@
 #include "register/case_loading.h"
 
 #include <algorithm>
+#include <tuple>
 #include <utility>
 
 #include "base/error.h"
 #include "base/joined.h"
 #include "base/number_text.h"
-#include "base/stored_bytes.h"
 #include "drr/opened_field.h"
 #include "files/sha256.h"
 #include "geometry/camera_distance.h"
+#include "ranks/root_only.h"
 #include "register/case_renderers.h"
 #include "register/kept_fields.h"
 #include "register/problem/fiducial_mask.h"
@@ -18,7 +19,6 @@
 #include "study/ct_keys.h"
 #include "study/node_ct.h"
 #include "study/rig_file.h"
-#include "study/shared_inputs.h"
 #include "study/target_place.h"
 #include "study/xray_reader.h"
 
@@ -56,11 +56,19 @@ void require_known_field_cameras(const StudyCase& study_case, const CaseLoadOpti
   }
 }
 
+/// What rank 0 tells the others of a view's files.
+struct ViewImages {
+  Image2d xray;
+  Image2d mask;
+
+  auto members() { return std::tie(xray, mask); }
+};
+
 /// X-ray and mask of a view from their files; hashes, notes and warnings go to `loaded`.
-void read_images(const StudyView& study_view, RegistrationView& view, LoadedCase& loaded) {
-  ViewXray xray = read_view_xray(study_view, view.view.camera);
-  view.xray = std::move(xray.attenuation);
-  view.mask = std::move(xray.mask);
+ViewImages read_images(const StudyView& study_view,
+                       const CameraGeometry& camera,
+                       LoadedCase& loaded) {
+  ViewXray xray = read_view_xray(study_view, camera);
   loaded.input_notes["xray " + study_view.camera] = xray.note;
   for (std::string& warning : xray.warnings) loaded.warnings.push_back(std::move(warning));
   const auto note_hash = [&](const char* kind, const std::filesystem::path& path) {
@@ -70,6 +78,7 @@ void read_images(const StudyView& study_view, RegistrationView& view, LoadedCase
   if (study_view.mask) note_hash("mask", *study_view.mask);
   if (study_view.reading.flat) note_hash("flat", *study_view.reading.flat);
   if (study_view.reading.dark) note_hash("dark", *study_view.reading.dark);
+  return {std::move(xray.attenuation), std::move(xray.mask)};
 }
 
 /// Collective. The views without renderers; rank 0 reads the images and keeps hashes and notes.
@@ -81,13 +90,16 @@ std::vector<RegistrationView> read_views(const Study& study,
   std::vector<RegistrationView> views;
   for (const StudyView& study_view : study_case.views) {
     RegistrationView view;
-    all_or_none(communicator, [&] {
-      view.view = {study.rig.camera(study_view.camera), study_view.roi};
-      if (communicator.is_root()) read_images(study_view, view, loaded);
+    view.view = all_or_none(communicator, [&] {
+      return View{study.rig.camera(study_view.camera), study_view.roi};
     });
-    broadcast(view.xray, communicator);
-    broadcast(view.mask, communicator);
     const CameraGeometry& camera = view.view.camera;
+    ViewImages images =
+        on_root(communicator, [&] { return read_images(study_view, camera, loaded); })
+            .share()
+            .take();
+    view.xray = std::move(images.xray);
+    view.mask = std::move(images.mask);
     view.mask_without_markers =
         mask_fiducials(view.mask,
                        camera,
@@ -160,10 +172,8 @@ void require_field_of_case(const OpenedField& opened,
 
 /// Collective. Rank 0's box on every rank: processors may differ in its last bits.
 MotionRange shared_box(const MotionRange& range, const Communicator& communicator) {
-  std::vector<std::byte> bytes = bytes_of(range.high);
-  communicator.broadcast(bytes);
-  const auto high = value_of<PoseParameters>(bytes, "the covered box of rank 0");
-  return {high.rotation_rad.x(), high.translation_mm.x()};
+  const Shared<PoseParameters> high = on_root(communicator, [&] { return range.high; }).share();
+  return {high->rotation_rad.x(), high->translation_mm.x()};
 }
 
 /// The views' camera that a field was made for; none: another one.

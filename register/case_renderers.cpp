@@ -10,7 +10,6 @@
 #include <utility>
 #include <vector>
 
-#include "base/stored_bytes.h"
 #include "ct/blurred_volume.h"
 #include "drr/field_level.h"
 #include "drr/field_renderer.h"
@@ -18,6 +17,7 @@
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
 #include "geometry/motion_range.h"
+#include "ranks/root_only.h"
 #include "study/node_ct.h"
 
 namespace af::registration {
@@ -174,10 +174,8 @@ FieldRenderers renderers_of_atlas(const OpenedField& opened,
                                   const View& view,
                                   const LevelThreads& threads,
                                   const Communicator& communicator) {
-  std::vector<std::uint64_t> near = members_in_reach(opened, nominal, view);
-  std::vector<std::byte> bytes = bytes_of(near);
-  communicator.broadcast(bytes);
-  near = value_of<std::vector<std::uint64_t>>(bytes, "the members of rank 0");
+  const std::vector<std::uint64_t> near =
+      on_root(communicator, [&] { return members_in_reach(opened, nominal, view); }).share();
   const auto open = [opened, levels, threads](std::size_t member) {
     return std::make_shared<const MemberLevels>(
         renderers_of(opened.member(member, Communicator::alone()),

@@ -20,6 +20,7 @@
 #include "files/sha256.h"
 #include "geometry/target_box.h"
 #include "geometry/tre.h"
+#include "ranks/root_only.h"
 #include "ranks/run_folder.h"
 #include "ranks/terminal.h"
 #include "ranks/work_watch.h"
@@ -78,7 +79,7 @@ RegistrationOptions method_of(const RegisterOptions& options, const Communicator
 
 /// What the study says of the case; the same on every rank.
 struct CaseToRegister {
-  Study study;
+  Shared<Study> study;
   StudyCase of;
   std::optional<LandmarkPose> landmarks;  ///< when they are the start
   std::vector<RigidTransform> starts;
@@ -91,9 +92,8 @@ void warn_of(const std::vector<std::string>& texts, const Communicator& world) {
 
 /// Collective.
 CaseToRegister read_case(const RegisterOptions& options, const Communicator& world) {
-  CaseToRegister found;
-  found.study = shared_study(options.study, world);
-  found.of = all_or_none(world, [&] { return found.study.find_case(options.case_name); });
+  CaseToRegister found{shared_study(options.study, world), {}, {}, {}, {}};
+  found.of = all_or_none(world, [&] { return found.study->find_case(options.case_name); });
   if (starts_from_landmarks(options, found.of))
     found.landmarks = all_or_none(world, [&] { return landmark_pose(found.study, found.of); });
   std::vector<std::string> notes;
@@ -140,9 +140,7 @@ RunDescription description_of(const RegisterOptions& in_force,
                             world.size(),
                             loaded.inputs,
                             loaded.input_notes};
-  all_or_none(world, [&] {
-    if (world.is_root()) description.provenance.inputs.merge(hashes_of_files(in_force));
-  });
+  do_on_root(world, [&] { description.provenance.inputs.merge(hashes_of_files(in_force)); });
   return description;
 }
 
@@ -231,8 +229,7 @@ void run_registration(const RegisterOptions& options,
   Registrar registrar = all_or_none(world, [&] {
     return Registrar(problem, RegistrationRunner(problem, method, pool), options.uncertainty, pool);
   });
-  all_or_none(world, [&] {
-    if (!world.is_root()) return;
+  do_on_root(world, [&] {
     announce_outputs(options.output_folder, overlay_file_names(*problem));
     announce_outputs(options.output_folder / "slicer", slicer_file_names(*problem));
   });
@@ -248,9 +245,8 @@ void run_registration(const RegisterOptions& options,
       folder.unfinished("registrations",
                         deciding_values(deciding_options(in_force), description.provenance.inputs)),
       world);
-  all_or_none(world, [&] {
-    if (world.is_root())
-      write_results(options, registered, problem, description, world, records, folder);
+  do_on_root(world, [&] {
+    write_results(options, registered, problem, description, world, records, folder);
   });
 }
 
@@ -264,18 +260,14 @@ std::vector<RegistrationRecord> register_starts(Registrar& registrar,
   std::vector<RegistrationRecord> records;
   if (starts.empty()) return records;
   if (starts.size() == 1) {
-    all_or_none(communicator, [&] {
-      if (communicator.is_root()) records.push_back(run(0));
-    });
+    do_on_root(communicator, [&] { records.push_back(run(0)); });
     return records;
   }
   ResumableItems items(unfinished, communicator);
   std::vector<std::int64_t> all(starts.size());
   std::iota(all.begin(), all.end(), 0);
   items.complete(all, "registrations", [&](std::int64_t index) { return bytes_of(run(index)); });
-  all_or_none(communicator, [&] {
-    if (communicator.is_root()) records = records_of(items, starts.size());
-  });
+  do_on_root(communicator, [&] { records = records_of(items, starts.size()); });
   return records;
 }
 

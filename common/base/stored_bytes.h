@@ -17,6 +17,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <filesystem>
 #include <span>
 #include <string>
 #include <string_view>
@@ -51,6 +52,11 @@ concept Optional = requires(T& value) {
   value.emplace();
 };
 
+template <typename T>
+concept Map = requires {
+  typename T::mapped_type;
+};
+
 /// Numbers or letters one after the other in memory.
 template <typename T>
 concept PlainList = requires(T& list) {
@@ -75,6 +81,15 @@ class ByteWriter {
       bool has_value = value.has_value();
       add(has_value);
       if (has_value) add(*value);
+    } else if constexpr (std::is_same_v<T, std::filesystem::path>) {
+      add(value.native());
+    } else if constexpr (Map<T>) {
+      std::uint64_t count = value.size();
+      add(count);
+      for (auto& [key, mapped] : value) {
+        add(key);
+        add(mapped);
+      }
     } else {
       add_list(value);
     }
@@ -125,6 +140,19 @@ class ByteReader {
       bool has_value = false;
       take(has_value);
       if (has_value) take(value.emplace());
+    } else if constexpr (std::is_same_v<T, std::filesystem::path>) {
+      std::string text;
+      take(text);
+      value = text;
+    } else if constexpr (Map<T>) {
+      std::uint64_t count = 0;
+      take(count);
+      require(count <= bytes_.size());
+      for (std::uint64_t i = 0; i < count; ++i) {
+        typename T::key_type key{};
+        take(key);
+        take(value[key]);
+      }
     } else {
       take_list(value);
     }

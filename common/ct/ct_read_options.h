@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -24,6 +25,17 @@ struct CtReadOptions {
   double values_water_mu_per_mm = 0.0200;  ///< mu that becomes 0 HU, of "mu" and "raw"
   std::vector<std::string> label_hu;       ///< of "labels": "3=700"; others are air
   bool keeps_body_only = false;            ///< table and head holder become air
+
+  auto members() {
+    return std::tie(series_uid,
+                    resamples,
+                    values,
+                    raw_slope_per_mm,
+                    raw_offset_per_mm,
+                    values_water_mu_per_mm,
+                    label_hu,
+                    keeps_body_only);
+  }
 
   void describe(Fields& field);
 

@@ -6,6 +6,7 @@
 #include "base/error.h"
 #include "drr/field_renderer.h"
 #include "field/field_reading.h"
+#include "ranks/root_only.h"
 
 namespace af {
 
@@ -13,12 +14,7 @@ OpenedField::OpenedField(const std::filesystem::path& path,
                          const Communicator& communicator,
                          Materials materials)
     : path_(path) {
-  std::string kind;
-  all_or_none(communicator, [&] {
-    if (communicator.is_root()) kind = is_atlas_file(path) ? "atlas" : "field";
-  });
-  communicator.broadcast(kind);
-  if (kind == "atlas") {
+  if (*on_root(communicator, [&] { return is_atlas_file(path); }).share()) {
     atlas_ = read_atlas(path, communicator, &info_);
     all_or_none(communicator, [&] {
       if (materials == Materials::All && atlas_->identity.material != FieldMaterial::All)

@@ -10,11 +10,11 @@
 #include <utility>
 
 #include "base/error.h"
-#include "base/stored_bytes.h"
 #include "field/hdf5_calls.h"
 #include "field/index_dataset.h"
 #include "files/input_file.h"
 #include "files/input_guard.h"
+#include "ranks/root_only.h"
 
 namespace af::field_layout {
 namespace {
@@ -242,15 +242,11 @@ FileHeader read_header_of(bool atlas, const std::filesystem::path& path) {
 FileHeader shared_header(bool atlas,
                          const std::filesystem::path& path,
                          const Communicator& communicator) {
-  FileHeader header;
-  all_or_none(communicator, [&] {
-    if (communicator.is_root())
-      header = hdf5::naming_file(path, [&] { return read_header_of(atlas, path); });
-  });
-  std::vector<std::byte> bytes = bytes_of(header);
-  communicator.broadcast(bytes);
+  const auto read = [&] {
+    return hdf5::naming_file(path, [&] { return read_header_of(atlas, path); });
+  };
+  FileHeader header = on_root(communicator, read).share().take();
   if (communicator.is_root()) return header;
-  header = value_of<FileHeader>(bytes, "the header from rank 0");
   for (std::size_t i = 0; i < header.fields.size(); ++i)
     header.fields[i].index_rules =
         within(atlas ? member_group(i) : "", index_rules(header.fields[i].field(path.string())));

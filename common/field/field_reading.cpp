@@ -5,13 +5,13 @@
 #include <span>
 
 #include "base/error.h"
-#include "base/stored_bytes.h"
 #include "field/field_header.h"
 #include "field/field_layout.h"
 #include "field/hdf5_calls.h"
 #include "field/index_dataset.h"
 #include "files/reading_turn.h"
 #include "files/sha256.h"
+#include "ranks/root_only.h"
 
 namespace af {
 
@@ -83,8 +83,7 @@ std::shared_ptr<const CompressedAttenuationField> field_with_indices(
       return read_slab(
           path, header.index_rules[k], header.index_sha256[k], field->codebook, communicator);
     }));
-  all_or_none(communicator, [&] {
-    if (!communicator.is_root()) return;
+  do_on_root(communicator, [&] {
     const auto found = problems(*field);
     if (!found.empty()) throw FileError(path.string(), found.front());
   });
@@ -94,11 +93,9 @@ std::shared_ptr<const CompressedAttenuationField> field_with_indices(
 }  // namespace
 
 void share_geometry(LightSlab& light_slab, const Communicator& communicator) {
-  std::vector<std::byte> bytes = bytes_of(field_layout::geometry_datasets(light_slab));
-  communicator.broadcast(bytes);
-  field_layout::set_geometry(value_of<std::vector<Dataset>>(bytes, "the geometry of rank 0"),
-                             "the geometry of rank 0",
-                             light_slab);
+  const Shared<std::vector<Dataset>> geometry =
+      on_root(communicator, [&] { return field_layout::geometry_datasets(light_slab); }).share();
+  field_layout::set_geometry(*geometry, "the geometry of rank 0", light_slab);
 }
 
 CompressedAttenuationField read_field_header(const std::filesystem::path& path) {

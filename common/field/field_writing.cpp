@@ -5,6 +5,7 @@
 #include <array>
 #include <iterator>
 #include <span>
+#include <tuple>
 #include <utility>
 
 #include "base/error.h"
@@ -17,6 +18,7 @@
 #include "files/sha256.h"
 #include "ranks/mpi_environment.h"
 #include "ranks/mpi_handle.h"
+#include "ranks/root_only.h"
 #include "ranks/work_watch.h"
 
 namespace af {
@@ -349,12 +351,13 @@ std::string seal(const FileContents& contents,
   return payload;
 }
 
-void share(FieldFileInfo& info, const Communicator& communicator) {
-  communicator.broadcast(info.payload_sha256);
-  std::array<std::uint64_t, 1> bytes{communicator.is_root() ? info.file_bytes : 0};
-  communicator.maximum(bytes);
-  info.file_bytes = bytes[0];
-}
+/// What is known of a file once it is sealed.
+struct SealedFile {
+  std::string payload_sha256;
+  std::uint64_t file_bytes = 0;
+
+  auto members() { return std::tie(payload_sha256, file_bytes); }
+};
 
 /// Collective. What write_field() and write_atlas() promise.
 FieldFileInfo write_file(const FileContents& contents,
@@ -369,12 +372,9 @@ FieldFileInfo write_file(const FileContents& contents,
   info.payload_bytes = contents.payload_bytes;
   // Not in the block below, which removes the partial file on failure: this check may refuse a file
   // that this program did not make.
-  all_or_none(communicator, [&] {
-    if (communicator.is_root()) check_output_file(path, partial);
-  });
+  do_on_root(communicator, [&] { check_output_file(path, partial); });
   try {
-    all_or_none(communicator, [&] {
-      if (!communicator.is_root()) return;
+    do_on_root(communicator, [&] {
       const WorkNote note("making " + partial.string());
       lay_out(partial, hints);
       naming_file(partial, [&] { create_file_without_indices(contents, partial); });
@@ -382,14 +382,16 @@ FieldFileInfo write_file(const FileContents& contents,
     const auto sums = write_indices(partial, contents.indices, next_blocks, communicator, hints);
     info.provenance = make_provenance();
     const auto hashes = verify_indices(contents.indices, sums, partial, communicator);
-    all_or_none(communicator, [&] {
-      if (!communicator.is_root()) return;
+    const auto seal_on_root = [&] {
       const WorkNote note("sealing " + partial.string());
-      info.payload_sha256 =
+      std::string payload =
           naming_file(partial, [&] { return seal(contents, info.provenance, hashes, partial); });
       move_into_place(partial, path);
-      info.file_bytes = std::filesystem::file_size(path);
-    });
+      return SealedFile{std::move(payload), std::filesystem::file_size(path)};
+    };
+    const Shared<SealedFile> sealed = on_root(communicator, seal_on_root).share();
+    info.payload_sha256 = sealed->payload_sha256;
+    info.file_bytes = sealed->file_bytes;
   } catch (const Error& error) {
     // When MPI is finalised, HDF5 would retry the failed write.
     if (error.exit_code() != ExitCode::Stopped) MpiEnvironment::require_abort();
@@ -397,7 +399,6 @@ FieldFileInfo write_file(const FileContents& contents,
     if (communicator.is_root()) std::filesystem::remove(partial, ignored);
     throw;
   }
-  share(info, communicator);
   return info;
 }
 

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include <Eigen/Core>
@@ -30,6 +31,17 @@ struct CameraGeometry {
   /// Of the stored X-rays: they are undistorted on reading, and everything here is of the
   /// undistorted ones.
   LensDistortion distortion;
+
+  auto members() {
+    return std::tie(name,
+                    source_point,
+                    detector_origin_point,
+                    column_direction,
+                    row_direction,
+                    pixel_spacing_mm,
+                    size_px,
+                    distortion);
+  }
 
   [[nodiscard]] Eigen::Vector3d detector_point(double column, double row) const;
   [[nodiscard]] Ray ray(double column, double row) const;
@@ -69,6 +81,8 @@ std::vector<std::string> problems(const CameraGeometry& camera);
 struct CameraRig {
   Eigen::Vector3d isocenter_point = Eigen::Vector3d::Zero();
   std::vector<CameraGeometry> cameras;
+
+  auto members() { return std::tie(isocenter_point, cameras); }
 
   /// The camera of that name, or the only one whose name differs just in the case of letters.
   /// Throws InputError that lists the known names.

@@ -4,6 +4,7 @@
 #include <array>
 #include <optional>
 #include <string>
+#include <tuple>
 
 #include <Eigen/Core>
 
@@ -17,6 +18,8 @@ struct CameraGeometry;
 ///   (x f + 2 p1 x y + p2 (r2 + 2 x^2), y f + p1 (r2 + 2 y^2) + 2 p2 x y).
 struct LensDistortion {
   std::array<double, 8> coefficients{};  ///< k1, k2, p1, p2, k3, k4, k5, k6
+
+  auto members() { return std::tie(coefficients); }
 
   [[nodiscard]] bool is_none() const;
   /// As many as are written: 0, 5 or 8.

@@ -50,6 +50,8 @@ double lowest_source_y_mm(const CameraGeometry& camera,
 struct CtBox {
   Eigen::Vector3d low_mm;
   Eigen::Vector3d high_mm;
+
+  auto members() { return std::tie(low_mm, high_mm); }
   [[nodiscard]] std::array<Eigen::Vector3d, 8> corner_points() const;
 };
 

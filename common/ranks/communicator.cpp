@@ -276,7 +276,7 @@ std::shared_ptr<const std::byte> Communicator::allocate_on_nodes_from_root(
   if (is_first_of_node) {
     const WaitNote waits;
     broadcast_bytes(first_ranks, memory);
-    MPI_Comm_free(&first_ranks);
+    MPI_Comm_free(&first_ranks);  // all of its ranks are here
   }
   barrier();
   return owner;

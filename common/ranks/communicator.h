@@ -44,12 +44,14 @@ class Communicator {
   /// A cache line.
   static constexpr std::size_t kNodeMemoryAlignment = 64;
 
-  /// Collective. The ranks that share this rank's memory.
+  /// Collective. The ranks that share this rank's memory, a group that lasts as long as MPI does.
   [[nodiscard]] Communicator node() const;
 
   /// Collective. Memory of `bytes` bytes held once per node, aligned to kNodeMemoryAlignment;
   /// `fill` runs on each node's first rank only, and all wait for it. An exception in `fill` is
-  /// thrown on every rank of every node.
+  /// thrown on every rank of every node. To let go of it is not collective: each process unmaps its
+  /// own view (NodeMemoryFile), and the system frees the memory with the last. So ranks may do it
+  /// in any order, also while an exception unwinds, and none waits.
   [[nodiscard]] std::shared_ptr<const std::byte> allocate_on_node(
       std::size_t bytes, const std::function<void(std::span<std::byte>)>& fill) const;
   /// Collective. The same, filled together: `fill` runs on every rank of the node and gets the
@@ -88,8 +90,9 @@ RankFailure failure_of(const std::exception_ptr& error);
 [[noreturn]] void throw_failure(const RankFailure& failure);
 
 /// Collective. Runs `function` on every rank; when it throws on any rank, every rank throws the
-/// same error. Before the next collective call, wrap everything that may fail on some ranks only;
-/// otherwise the other ranks wait for ever.
+/// same error. Before the next collective call, wrap everything that each rank does by itself and
+/// that may fail on some ranks only; otherwise the other ranks wait for ever. What rank 0 does for
+/// all is on_root() or do_on_root().
 template <typename Function>
 std::invoke_result_t<Function> all_or_none(const Communicator& communicator, Function&& function) {
   using Result = std::invoke_result_t<Function>;

@@ -8,10 +8,11 @@
 
 namespace af {
 
+/// Its destructor frees no group of MPI: that is a collective call, and the last owner of a rank
+/// may go at a place where the other ranks never come.
 struct Communicator::Impl {
   MPI_Comm handle = MPI_COMM_NULL;  ///< null: Communicator::alone()
-  /// Communicator::node(), once it was asked for. MPI_Finalize() frees it: to free it earlier would
-  /// be a collective call at a place where the other ranks may never come.
+  /// Communicator::node(), once it was asked for; MPI_Finalize() frees it.
   std::shared_ptr<Impl> node = nullptr;
 };
 

@@ -13,6 +13,7 @@
 #include <initializer_list>
 #include <span>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "ranks/deciding_values.h"
@@ -34,6 +35,7 @@ struct JournalShard {
   std::int64_t run = 0;
   std::int64_t rank = 0;
 
+  auto members() { return std::tie(run, rank); }
   auto operator<=>(const JournalShard&) const = default;
 };
 

@@ -3,12 +3,12 @@
 
 #include <cstddef>
 #include <filesystem>
-#include <optional>
 #include <span>
+#include <tuple>
 #include <vector>
 
-#include "ranks/communicator.h"
 #include "ranks/progress_journal.h"
+#include "ranks/root_only.h"
 
 namespace af {
 
@@ -21,9 +21,10 @@ class ProgressStore {
 
   [[nodiscard]] const std::filesystem::path& folder() const { return files_.folder; }
   /// As ProgressJournal::unit_size(), the same on every rank.
-  [[nodiscard]] std::int64_t unit_size() const { return unit_size_; }
-  /// Rank 0: as ProgressJournal::has_replaced() and visit().
-  [[nodiscard]] bool has_replaced() const { return journal_->has_replaced(); }
+  [[nodiscard]] std::int64_t unit_size() const { return opened_->unit_size; }
+  /// As ProgressJournal::has_replaced(), the same on every rank.
+  [[nodiscard]] bool has_replaced() const { return opened_->has_replaced; }
+  /// Rank 0: as ProgressJournal::visit().
   void visit(const ProgressJournal::Visit& visit) const;
 
   /// Collective. Where the records of earlier runs lie, by run, rank and the order in which they
@@ -37,18 +38,27 @@ class ProgressStore {
   }
 
   /// This rank's.
-  [[nodiscard]] ProgressShard& shard() { return *shard_; }
-  [[nodiscard]] const ProgressShard& shard() const { return *shard_; }
+  [[nodiscard]] ProgressShard& shard() { return shard_; }
+  [[nodiscard]] const ProgressShard& shard() const { return shard_; }
 
   /// Rank 0 calls ProgressJournal::give_way(). Its failure is ignored: --restart helps.
   void give_way() const;
 
  private:
+  /// What rank 0 tells the others of the journal.
+  struct OpenedJournal {
+    std::int64_t run = 0;
+    std::int64_t unit_size = 0;
+    bool has_replaced = false;
+
+    auto members() { return std::tie(run, unit_size, has_replaced); }
+  };
+
   JournalFiles files_;
   Communicator communicator_;
-  std::optional<ProgressJournal> journal_;  ///< rank 0
-  std::optional<ProgressShard> shard_;
-  std::int64_t unit_size_ = 0;
+  RootOnly<ProgressJournal> journal_;
+  Shared<OpenedJournal> opened_;
+  ProgressShard shard_;
 };
 
 }  // namespace af

@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "ranks/progress_printer.h"
+#include "ranks/root_only.h"
 #include "ranks/stop_request.h"
 #include "ranks/terminal.h"
 #include "ranks/work_queue.h"
@@ -23,19 +24,20 @@ std::string of_all(std::size_t part, std::size_t all) {
 
 ResumableItems::ResumableItems(const UnfinishedWork& work, const Communicator& communicator)
     : communicator_(communicator), store_(work, communicator) {
-  all_or_none(communicator_, [&] {
-    if (!communicator_.is_root()) return;
+  do_on_root(communicator_, [&] {
     store_.visit([&](std::int64_t item, std::span<const std::byte>) { finished_.push_back(item); });
     std::sort(finished_.begin(), finished_.end());
   });
 }
 
 std::vector<std::int64_t> ResumableItems::unfinished(const std::vector<std::int64_t>& items) const {
-  std::vector<std::byte> flags(items.size());
-  if (communicator_.is_root())
+  const auto find_finished = [&] {
+    std::vector<std::byte> flags(items.size());
     for (std::size_t i = 0; i < items.size(); ++i)
       flags[i] = std::byte{std::binary_search(finished_.begin(), finished_.end(), items[i])};
-  communicator_.broadcast(flags);
+    return flags;
+  };
+  const std::vector<std::byte> flags = on_root(communicator_, find_finished).share().take();
   std::vector<std::int64_t> left;
   left.reserve(static_cast<std::size_t>(std::count(flags.begin(), flags.end(), std::byte{0})));
   for (std::size_t i = 0; i < items.size(); ++i)
@@ -78,11 +80,10 @@ void ResumableItems::save(const std::string& what) {
   if (!is_stop_requested(communicator_)) return;
   std::array<std::uint64_t, 1> saved = {saved_};
   communicator_.sum(saved);
-  all_or_none(communicator_, [&] {
-    if (communicator_.is_root())
-      throw StoppedError("stopped" + (what.empty() ? "" : ", " + what) + ": " +
-                         of_all(saved[0], items_.size()) +
-                         " saved: run the same command again to go on");
+  do_on_root(communicator_, [&] {
+    throw StoppedError("stopped" + (what.empty() ? "" : ", " + what) + ": " +
+                       of_all(saved[0], items_.size()) +
+                       " saved: run the same command again to go on");
   });
 }
 

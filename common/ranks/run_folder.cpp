@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "files/output_file.h"
+#include "ranks/root_only.h"
 #include "ranks/stop_request.h"
 
 namespace af {
@@ -26,14 +27,13 @@ fs::path progress_folder(const fs::path& output) {
 RunFolder::RunFolder(RunOutput output, const Communicator& world)
     : output_(std::move(output)), progress_(progress_folder(output_.path)), world_(world) {
   if (output_.keeps_progress) listen_for_stop_requests();
-  all_or_none(world_, [&] {
-    if (world_.is_root() && !output_.files.empty()) announce_outputs(output_.path, output_.files);
+  do_on_root(world_, [&] {
+    if (!output_.files.empty()) announce_outputs(output_.path, output_.files);
   });
 }
 
 void RunFolder::open() {
-  all_or_none(world_, [&] {
-    if (!world_.is_root()) return;
+  do_on_root(world_, [&] {
     const fs::path parent = output_.path.has_parent_path() ? output_.path.parent_path() : ".";
     make_folder(output_.files.empty() ? parent : output_.path);
     lock_ = std::make_unique<OutputLock>(output_.path);

@@ -7,9 +7,9 @@
 #include <tuple>
 
 #include "base/error.h"
-#include "base/stored_bytes.h"
 #include "ct/cut_faces.h"
 #include "drr/bone_volume.h"
+#include "ranks/root_only.h"
 #include "study/target_place.h"
 
 namespace af {
@@ -28,26 +28,15 @@ struct FoundInCt {
   }
 };
 
-FoundInCt found_in(const CtVolume& ct, const AttenuationModel& model) {
-  const AttenuatingBox box = attenuating_box(ct, model);
-  return {{ct.grid, identity_of(ct), cut_points(ct, model, box)}, bordered_grid(ct.grid, box)};
-}
-
-/// Collective. Rank 0 reads the CT, into `ct`, and every rank gets what is found in it.
-FoundInCt read_on_root(const std::filesystem::path& path,
-                       const CtReadOptions& options,
-                       const AttenuationModel& model,
-                       const Communicator& communicator,
-                       CtVolume& ct,
-                       std::vector<std::string>& warnings) {
-  std::vector<std::byte> bytes;
-  all_or_none(communicator, [&] {
-    if (!communicator.is_root()) return;
-    ct = read_ct(path, options, &warnings);
-    bytes = bytes_of(found_in(ct, model));
-  });
-  communicator.broadcast(bytes);
-  return value_of<FoundInCt>(bytes, "the CT of rank 0");
+/// Collective.
+Shared<FoundInCt> found_in(const RootOnly<CtVolume>& read, const AttenuationModel& model) {
+  return read
+      .then([&](const CtVolume& ct) {
+        const AttenuatingBox box = attenuating_box(ct, model);
+        return FoundInCt{{ct.grid, identity_of(ct), cut_points(ct, model, box)},
+                         bordered_grid(ct.grid, box)};
+      })
+      .share();
 }
 
 }  // namespace
@@ -97,13 +86,13 @@ NodeCt read_ct_per_node(const std::filesystem::path& path,
                         const AttenuationModel& model,
                         const Communicator& communicator,
                         std::vector<std::string>& warnings) {
-  CtVolume ct;
-  const FoundInCt found = read_on_root(path, options, model, communicator, ct, warnings);
+  const auto ct = on_root(communicator, [&] { return read_ct(path, options, &warnings); });
+  const Shared<FoundInCt> found = found_in(ct, model);
   const auto fill = [&](std::span<std::uint16_t> voxels) {
-    AttenuationVolume::fill_voxels(ct, model, found.bordered, voxels);
+    AttenuationVolume::fill_voxels(ct.value(), model, found->bordered, voxels);
   };
-  return {volume_per_node(found.bordered, model, VoxelSource::Root, fill, communicator),
-          found.facts};
+  return {volume_per_node(found->bordered, model, VoxelSource::Root, fill, communicator),
+          found->facts};
 }
 
 CtFacts read_ct_facts(const std::filesystem::path& path,
@@ -111,8 +100,8 @@ CtFacts read_ct_facts(const std::filesystem::path& path,
                       const AttenuationModel& model,
                       const Communicator& communicator,
                       std::vector<std::string>& warnings) {
-  CtVolume ct;
-  return read_on_root(path, options, model, communicator, ct, warnings).facts;
+  const auto ct = on_root(communicator, [&] { return read_ct(path, options, &warnings); });
+  return found_in(ct, model)->facts;
 }
 
 }  // namespace af

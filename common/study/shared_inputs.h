@@ -8,15 +8,14 @@
 #include <vector>
 
 #include "geometry/rigid_transform.h"
-#include "ranks/communicator.h"
+#include "ranks/root_only.h"
 #include "study/study_file.h"
-#include "xray/image2d.h"
 
 namespace af {
 
 /// Collective. read_study() on rank 0; the others are sent what it read. What it throws, every rank
 /// throws. What is odd about its rig is told by af-inspect.
-Study shared_study(const std::filesystem::path& path, const Communicator& communicator);
+Shared<Study> shared_study(const std::filesystem::path& path, const Communicator& communicator);
 
 /// Collective. read_rig() on rank 0, in the same way; `warnings` are rank 0's.
 CameraRig shared_rig(const std::string& name_or_path,
@@ -27,8 +26,5 @@ CameraRig shared_rig(const std::string& name_or_path,
 /// there alone, and what it throws, every rank throws.
 std::vector<RigidTransform> shared_poses(const Communicator& communicator,
                                          const std::function<std::vector<RigidTransform>()>& read);
-
-/// Collective. Rank 0's image, to the last bit, on every rank.
-void broadcast(Image2d& image, const Communicator& communicator);
 
 }  // namespace af

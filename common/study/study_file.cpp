@@ -11,7 +11,6 @@
 #include "base/file_name.h"
 #include "base/named_rows.h"
 #include "base/toml_text.h"
-#include "files/output_file.h"
 #include "files/toml_reader.h"
 #include "geometry/fiducial_registration.h"
 #include "geometry/target_box.h"
@@ -490,15 +489,7 @@ std::vector<const StudyCase*> Study::chosen_cases(const std::vector<std::string>
 }
 
 Study read_study(const std::filesystem::path& path, std::vector<std::string>* warnings) {
-  return parse_study(read_text_file(path, kMostTomlBytes), path, [&](const std::string& rig) {
-    return read_rig(rig, warnings);
-  });
-}
-
-Study parse_study(const std::string& text,
-                  const std::filesystem::path& path,
-                  const std::function<CameraRig(const std::string& name_or_path)>& read_rig_of) {
-  const toml::table table = parse_toml(text, path.string());
+  const toml::table table = read_toml_file(path);
   TomlProblems problems(path.string());
   TomlTableReader reader(table, "", problems);
   Study study;
@@ -507,8 +498,9 @@ Study parse_study(const std::string& text,
   const auto rig = reader.get_string("rig", Presence::Required);
   if (!rig) problems.throw_if_any();  // without cameras nothing else can be judged
   study.rig_name_or_path = resolved_rig(*rig, folder);
-  study.rig = naming_study_line(
-      {{"rig", reader.place("rig")}}, "rig", [&] { return read_rig_of(study.rig_name_or_path); });
+  study.rig = naming_study_line({{"rig", reader.place("rig")}}, "rig", [&] {
+    return read_rig(study.rig_name_or_path, warnings);
+  });
   read_cases(reader, study, {folder, study.rig, problems});
   reader.refuse_unknown_keys();
   problems.throw_if_any();

@@ -2,10 +2,10 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
 #include <map>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <type_traits>
 #include <vector>
 
@@ -39,6 +39,11 @@ struct StudyView {
   std::optional<std::filesystem::path> mask;
   XrayReading reading;
   StudyPlaces places;
+
+  auto members() {
+    return std::tie(
+        camera, xray, xray_domain, roi, fiducials_px, landmarks_px, field, mask, reading, places);
+  }
 };
 
 /// One patient.
@@ -58,6 +63,21 @@ struct StudyCase {
   std::vector<StudyView> views;
   StudyPlaces places;
 
+  auto members() {
+    return std::tie(name,
+                    note,
+                    ct,
+                    ct_reading,
+                    nominal_room_from_ct,
+                    center_ct_mm,
+                    target_box_ct,
+                    fiducials_ct_mm,
+                    landmarks_ct_mm,
+                    gold_room_from_ct,
+                    views,
+                    places);
+  }
+
   /// The frame that --start-* options and fields of this case use: nominal pose, about
   /// center_ct_mm.
   [[nodiscard]] PoseFrame frame() const {
@@ -71,6 +91,7 @@ struct Study {
   std::string rig_name_or_path;
   std::vector<StudyCase> cases;
 
+  auto members() { return std::tie(path, rig, rig_name_or_path, cases); }
   /// Throws InputError that lists the known names; an empty name picks the only case.
   [[nodiscard]] const StudyCase& find_case(const std::string& name) const;
   /// The named cases, each once, or all; by name.
@@ -83,11 +104,6 @@ struct Study {
 /// the detector, collinear or unequal numbers of fiducials, unknown camera, unknown keys as a typo
 /// hint), FileError (4) when it cannot be parsed. `warnings` receives those of the rig.
 Study read_study(const std::filesystem::path& path, std::vector<std::string>* warnings = nullptr);
-
-/// read_study() of a text that stands in `path`, its rig read by `read_rig_of`.
-Study parse_study(const std::string& text,
-                  const std::filesystem::path& path,
-                  const std::function<CameraRig(const std::string& name_or_path)>& read_rig_of);
 
 /// Runs `use`, which reads the file that `key` names; what it throws then begins with the study's
 /// line. \test StudyFile.ErrorsOfItsFilesNameTheLine

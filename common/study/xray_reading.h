@@ -5,6 +5,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <tuple>
 
 namespace af {
 
@@ -41,6 +42,11 @@ struct XrayReading {
   double dark_level = 0.0;
   bool masks_borders = false;    ///< mask = "auto"
   bool ignores_spacing = false;  ///< the file's pixel spacing may differ from the camera's
+
+  auto members() {
+    return std::tie(
+        frame, polarity, air, air_level, flat, dark, dark_level, masks_borders, ignores_spacing);
+  }
 };
 
 /// Reads a path of the study and notes its place.

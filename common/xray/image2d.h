@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <span>
 #include <string>
+#include <tuple>
 #include <vector>
 
 namespace af {
@@ -15,6 +16,7 @@ struct RegionOfInterest {
   int width = 0;
   int height = 0;
 
+  auto members() { return std::tie(column, row, width, height); }
   [[nodiscard]] std::size_t pixel_count() const {
     return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   }
@@ -35,6 +37,7 @@ struct Image2d {
         height(image_height),
         pixels(static_cast<std::size_t>(image_width) * static_cast<std::size_t>(image_height)) {}
 
+  auto members() { return std::tie(width, height, pixels); }
   [[nodiscard]] float& at(int column, int row) { return pixels[index(column, row)]; }
   [[nodiscard]] float at(int column, int row) const { return pixels[index(column, row)]; }
 

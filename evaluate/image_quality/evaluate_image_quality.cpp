@@ -27,6 +27,7 @@
 #include "files/sha256.h"
 #include "files/shell_words.h"
 #include "geometry/camera_distance.h"
+#include "ranks/root_only.h"
 #include "ranks/run_folder.h"
 #include "ranks/terminal.h"
 #include "study/node_ct.h"
@@ -325,9 +326,7 @@ TargetResult evaluate_target(const ImageQualityOptions& options,
                              const std::string& command_line,
                              const RunFolder& run,
                              const Communicator& world) {
-  all_or_none(world, [&] {
-    if (world.is_root()) make_folder(target.folder);
-  });
+  do_on_root(world, [&] { make_folder(target.folder); });
   const Setup setup = load(options, target, world);
   const auto [field, ray_cast] = renderers_of(options, setup, world);
   DrrComparer comparer(*field, *ray_cast, setup.view);
@@ -340,10 +339,9 @@ TargetResult evaluate_target(const ImageQualityOptions& options,
                             {"ct", setup.ct.facts.identity}}};
   if (setup.bone)
     provenance.inputs["bone field " + setup.view.camera.name] = setup.bone->info().payload_sha256;
-  all_or_none(world, [&] {
-    if (world.is_root() && !options.poses.empty())
-      provenance.inputs["poses"] = sha256_of_file(options.poses.string());
-    if (world.is_root() && !options.rig.empty())
+  do_on_root(world, [&] {
+    if (!options.poses.empty()) provenance.inputs["poses"] = sha256_of_file(options.poses.string());
+    if (!options.rig.empty())
       for (const std::filesystem::path& file : rig_files(options.rig))
         provenance.inputs["rig " + file.filename().string()] = sha256_of_file(file.string());
   });
@@ -370,10 +368,8 @@ TargetResult evaluate_target(const ImageQualityOptions& options,
       });
   const std::vector<LossSplit> splits =
       split_losses(options, setup, *field, *ray_cast, comparer, unfinished("-losses"), world);
-  all_or_none(world, [&] {
-    if (world.is_root())
-      write_results(options, target, setup, comparer, splits, result, provenance);
-  });
+  do_on_root(world,
+             [&] { write_results(options, target, setup, comparer, splits, result, provenance); });
   return result;
 }
 
@@ -503,8 +499,7 @@ void run_image_quality(const ImageQualityOptions& options,
   results.reserve(targets.size());
   for (const Target& target : targets)
     results.push_back(evaluate_target(options, target, command_line, run, world));
-  all_or_none(world, [&] {
-    if (!world.is_root()) return;
+  do_on_root(world, [&] {
     std::vector<std::string> drawn;
     for (const Target& target : targets) drawn.push_back(target.folder.string());
     if (!options.study.empty()) {

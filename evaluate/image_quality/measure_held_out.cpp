@@ -15,6 +15,7 @@
 #include "evaluate/report/table_paths.h"
 #include "files/csv_cells.h"
 #include "files/output_file.h"
+#include "ranks/root_only.h"
 #include "ranks/terminal.h"
 #include "study/node_ct.h"
 #include "study/shared_inputs.h"
@@ -210,20 +211,19 @@ void run_held_out(const HeldOutOptions& options,
     announce_output(csv);
     announce_output(options.output);
   });
-  const Study study = shared_study(options.study, world);
+  const Shared<Study> study = shared_study(options.study, world);
   const std::vector<const StudyCase*> chosen = all_or_none(world, [&] {
-    std::vector<const StudyCase*> cases = study.chosen_cases(options.cases);
+    std::vector<const StudyCase*> cases = study->chosen_cases(options.cases);
     for (const StudyCase* study_case : cases)
       if (!study_case->gold_room_from_ct)
         throw InputError("case '" + study_case->name + "': gold_room_from_ct",
                          "none",
                          "must be in the study",
-                         study.path.string());
+                         study->path.string());
     return cases;
   });
   const std::vector<Predictor> predictors = load_predictors(options, world);
-  all_or_none(world, [&] {
-    if (!world.is_root()) return;
+  do_on_root(world, [&] {
     HeldOutRows found;
     for (const StudyCase* study_case : chosen)
       for (const StudyView& view : study_case->views)

@@ -27,6 +27,7 @@
 #include "files/sha256.h"
 #include "geometry/target_box.h"
 #include "ranks/resumable_items.h"
+#include "ranks/root_only.h"
 #include "ranks/work_watch.h"
 #include "register/results/outline_picture.h"
 #include "register/results/registration_results.h"
@@ -99,16 +100,15 @@ SharedArray<PerturbedStart> held_per_node(const SharedArray<PerturbedStart>& sta
   static_assert(std::is_trivially_destructible_v<PerturbedStart> &&
                 alignof(PerturbedStart) <= Communicator::kNodeMemoryAlignment);
   if (world.size() == 1) return starts;
-  std::array<std::uint64_t, 1> count = {world.is_root() ? starts.size() : 0};
-  world.maximum(count);
-  if (count[0] == 0) return {};
+  const std::size_t count = on_root(world, [&] { return starts.size(); }).share();
+  if (count == 0) return {};
   const auto owner = world.allocate_on_nodes_from_root(
-      count[0] * sizeof(PerturbedStart), [&](std::span<std::byte> memory) {
+      count * sizeof(PerturbedStart), [&](std::span<std::byte> memory) {
         std::uninitialized_copy(starts.data(),
                                 starts.data() + starts.size(),
                                 reinterpret_cast<PerturbedStart*>(memory.data()));
       });
-  return {owner, {reinterpret_cast<const PerturbedStart*>(owner.get()), count[0]}};
+  return {owner, {reinterpret_cast<const PerturbedStart*>(owner.get()), count}};
 }
 
 /// With both renderers, ray casting may be given fewer intervals and starts.
@@ -374,9 +374,8 @@ std::vector<MethodRows> begin_registrations(const RegistrationStudyOptions& opti
                                             const RunFolder& run,
                                             const Communicator& world) {
   const std::string name = file_name_part(evaluation.case_name);
-  const DecidingValues decides = all_or_none(world, [&] {
-    return world.is_root() ? deciding_values(options, evaluation) : DecidingValues();
-  });
+  DecidingValues decides;
+  do_on_root(world, [&] { decides = deciding_values(options, evaluation); });
   std::vector<MethodRows> begun;
   begun.reserve(methods.size());
   for (const Method& method : methods)
@@ -530,11 +529,9 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
     evaluation.gold = gold_standard(study, study_case, options.gold);
     return yardstick_of(study, study_case, evaluation.gold);
   });
-  evaluation.starts = all_or_none(world, [&] {
-    return world.is_root()
-               ? make_starts(
-                     options, study, study_case, yardstick, methods, evaluation.pose_problems)
-               : StratifiedStarts{};
+  do_on_root(world, [&] {
+    evaluation.starts =
+        make_starts(options, study, study_case, yardstick, methods, evaluation.pose_problems);
   });
   evaluation.starts.starts = held_per_node(evaluation.starts.starts, world);
   evaluation.start_count = evaluation.starts.starts.size();
@@ -544,7 +541,7 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
   // Refusals come first: they leave the results of an earlier run alone.
   std::vector<MethodRows> rows;
   if (!options.is_starts_only) rows = begin_registrations(options, evaluation, methods, run, world);
-  all_or_none(world, [&] { on_starts(evaluation); });
+  do_on_root(world, [&] { on_starts(evaluation); });
   if (options.is_starts_only) {
     evaluation.starts.starts = {};
     return evaluation;
@@ -555,15 +552,14 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
     register_with(methods[i], study_case.name, evaluation.starts, yardstick, rows[i].items);
   // The starts go before the rows come: memory has room for only one of the two.
   evaluation.starts.starts = {};
-  all_or_none(world, [&] {
-    if (world.is_root() && !options.has_no_pictures)
+  do_on_root(world, [&] {
+    if (!options.has_no_pictures)
       draw_pictures(options, study_case, methods.front(), rows.front(), yardstick, evaluation);
   });
   // Fields and CT go before the rows come: memory has room for only one of the two. Only fields
   // that the next case uses, too, stay (KeptFields).
   methods.clear();
-  all_or_none(world, [&] {
-    if (!world.is_root()) return;
+  do_on_root(world, [&] {
     if (!options.has_no_pictures) draw_setting(options, study, study_case, evaluation);
     const WorkNote note("reading the rows of case " + study_case.name, WorkNote::Kind::Phase);
     for (const MethodRows& method : rows)

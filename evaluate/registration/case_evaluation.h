@@ -64,7 +64,7 @@ RegistrationRow registered_row(
     const PerturbedStart& start,
     const Yardstick& yardstick);
 
-/// Collective. Draws a case's starts, calls `on_starts` with the evaluation so far (on every rank,
+/// Collective. Draws a case's starts, calls `on_starts` with the evaluation so far (on rank 0,
 /// before anything is registered), registers from every start with every renderer, the work shared
 /// over the ranks as these become free, and draws the X-rays and the overlays of the best, median
 /// and worst result. A registration that throws becomes a row without a pose. With --starts-only

@@ -7,6 +7,7 @@
 #include "evaluate/report/report_program.h"
 #include "evaluate/report/table_paths.h"
 #include "files/output_file.h"
+#include "ranks/root_only.h"
 
 namespace af::evaluation {
 
@@ -38,8 +39,7 @@ namespace {
 void run_compare(const CompareOptions& options,
                  const std::string& /*command_line*/,
                  const Communicator& world) {
-  all_or_none(world, [&] {
-    if (!world.is_root()) return;
+  do_on_root(world, [&] {
     throw_if_any(table_problems(options.output));
     const std::filesystem::path csv = csv_beside(options.output);
     const auto beside = [&](const std::string& what) {

@@ -30,6 +30,7 @@
 #include "files/sha256.h"
 #include "files/shell_words.h"
 #include "geometry/tre.h"
+#include "ranks/root_only.h"
 #include "ranks/run_folder.h"
 #include "ranks/terminal.h"
 #include "ranks/work_watch.h"
@@ -460,14 +461,11 @@ void run_registration(const RegistrationStudyOptions& options,
                   "summary.json"},
                  options.resume.restarts},
                 world);
-  const Study study = shared_study(options.study, world);
+  const Shared<Study> study = shared_study(options.study, world);
   const std::vector<StudyCase> cases =
       all_or_none(world, [&] { return chosen_cases(options, study); });
   run.open();
-  std::optional<StartsFile> starts_file;
-  all_or_none(world, [&] {
-    if (world.is_root()) starts_file.emplace(folder / "starts.csv");
-  });
+  auto starts_file = on_root(world, [&] { return StartsFile(folder / "starts.csv"); }).confirmed();
 
   std::vector<RegistrationRow> rows;
   std::size_t start_count = 0;
@@ -476,37 +474,36 @@ void run_registration(const RegistrationStudyOptions& options,
       cases, std::make_shared<ThreadPool>(thread_count(options.method.threads)));
   for (const StudyCase& study_case : cases) {
     const auto on_starts = [&](const CaseEvaluation& so_far) {
-      if (!world.is_root()) return;
       start_count += so_far.starts.starts.size();
       if (start_count > kMostStarts)
         throw InputError("starts = " + std::to_string(start_count) + ": a run takes at most " +
                          std::to_string(kMostStarts));
       run.begin_results();
-      starts_file->add(so_far.case_name, so_far.starts.starts.view());
-      if (evaluations.size() + 1 == cases.size()) starts_file->finish();
+      starts_file.value().add(so_far.case_name, so_far.starts.starts.view());
+      if (evaluations.size() + 1 == cases.size()) starts_file.value().finish();
     };
-    evaluations.push_back(
-        options.poses_from.empty()
-            ? evaluate_case(options, study, study_case, run, kept_fields, world, on_starts, rows)
-            : all_or_none(world, [&] {
-                return world.is_root()
-                           ? evaluate_found_poses(options, study, study_case, on_starts, rows)
-                           : CaseEvaluation{};
-              }));
+    CaseEvaluation evaluation;
+    if (options.poses_from.empty())
+      evaluation =
+          evaluate_case(options, study, study_case, run, kept_fields, world, on_starts, rows);
+    else
+      do_on_root(world, [&] {
+        evaluation = evaluate_found_poses(options, study, study_case, on_starts, rows);
+      });
+    evaluations.push_back(std::move(evaluation));
   }
   if (options.is_starts_only) {
     if (world.is_root()) std::cout << "starts: " << (folder / "starts.csv").string() << '\n';
     return;
   }
-  all_or_none(world, [&] {
-    if (!world.is_root()) return;
+  do_on_root(world, [&] {
     const WorkNote note("writing the results", WorkNote::Kind::Phase);
     Provenance provenance = {"af-evaluate registration",
                              command_line,
                              to_toml(options),
                              options.method.seed,
                              world.size(),
-                             {{"study", sha256_of_file(study.path.string())}}};
+                             {{"study", sha256_of_file(study->path.string())}}};
     for (const CaseEvaluation& evaluation : evaluations) {
       provenance.inputs.insert(evaluation.inputs.identities.begin(),
                                evaluation.inputs.identities.end());

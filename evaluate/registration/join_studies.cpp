@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "files/output_file.h"
+#include "ranks/root_only.h"
 #include "study/rig_file.h"
 
 namespace af::evaluation {
@@ -62,8 +63,7 @@ namespace {
 void run_join_studies(const JoinStudiesOptions& options,
                       const std::string& /*command_line*/,
                       const Communicator& world) {
-  all_or_none(world, [&] {
-    if (!world.is_root()) return;
+  do_on_root(world, [&] {
     announce_output(options.output);
     std::vector<Study> studies;
     for (const std::filesystem::path& path : options.studies) studies.push_back(read_study(path));

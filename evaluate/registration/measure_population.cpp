@@ -8,6 +8,7 @@
 #include "evaluate/registration/population_tables.h"
 #include "evaluate/report/report_program.h"
 #include "files/output_file.h"
+#include "ranks/root_only.h"
 
 namespace af::evaluation {
 
@@ -48,8 +49,7 @@ namespace {
 void run_population(const PopulationOptions& options,
                     const std::string& /*command_line*/,
                     const Communicator& world) {
-  all_or_none(world, [&] {
-    if (!world.is_root()) return;
+  do_on_root(world, [&] {
     PopulationReader reader(options.seed);
     for (const std::string& condition : options.conditions) reader.read(condition);
     write_population(options, reader, world);

@@ -3,6 +3,7 @@
 
 #include "evaluate/report/report_program.h"
 #include "files/output_file.h"
+#include "ranks/root_only.h"
 
 namespace af::evaluation {
 
@@ -19,8 +20,7 @@ namespace {
 void run_report(const ReportOptions& options,
                 const std::string& /*command_line*/,
                 const Communicator& world) {
-  all_or_none(world, [&] {
-    if (!world.is_root()) return;
+  do_on_root(world, [&] {
     announce_output(options.output);
     std::vector<std::string> arguments = {"--output=" + options.output.string()};
     if (!options.title.empty()) arguments.push_back("--title=" + options.title);

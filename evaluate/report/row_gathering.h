@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "base/stored_bytes.h"
-#include "ranks/communicator.h"
 #include "ranks/resumable_items.h"
+#include "ranks/root_only.h"
 
 namespace af::evaluation {
 
@@ -29,8 +29,7 @@ std::vector<Row> collected_rows(const Communicator& world,
   std::iota(all.begin(), all.end(), 0);
   items.complete(all, what, [&](std::int64_t item) { return bytes_of<Row>(row_of_item(item)); });
   std::vector<Row> rows(all.size());
-  all_or_none(world, [&] {
-    if (!world.is_root()) return;
+  do_on_root(world, [&] {
     items.visit([&](std::int64_t item, std::span<const std::byte> row) {
       rows[static_cast<std::size_t>(item)] = value_of<Row>(row, unfinished.folder.string());
     });

@@ -14,8 +14,9 @@
 #include "figures/picture.h"
 #include "files/csv_cells.h"
 #include "files/output_file.h"
+#include "ranks/root_only.h"
 #include "study/node_ct.h"
-#include "study/study_file.h"
+#include "study/shared_inputs.h"
 
 namespace af::evaluation {
 namespace {
@@ -29,21 +30,14 @@ const std::vector<double>& paper_levels_db() {
 
 /// Rank 0 knows the comparisons; all ranks need the choice. A DRR that is nearest to several levels
 /// is shown once.
-std::vector<SweepDrr> shared_choice(const std::vector<SettingResult>& results,
-                                    const Communicator& world) {
-  std::string text;
-  if (world.is_root()) {
-    json chosen = json::array();
-    for (const SweepDrr& drr : drrs_at_levels(results, paper_levels_db()))
-      if (const json pair = {drr.result, drr.pose}; chosen.empty() || chosen.back() != pair)
-        chosen.push_back(pair);
-    text = chosen.dump();
-  }
-  world.broadcast(text);
-  std::vector<SweepDrr> drrs;
-  for (const json& pair : json::parse(text))
-    drrs.push_back({pair[0].get<std::size_t>(), pair[1].get<std::size_t>()});
-  return drrs;
+Shared<std::vector<SweepDrr>> shared_choice(const std::vector<SettingResult>& results,
+                                            const Communicator& world) {
+  const auto choose = [&] {
+    std::vector<SweepDrr> chosen = drrs_at_levels(results, paper_levels_db());
+    chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+    return chosen;
+  };
+  return on_root(world, choose).share();
 }
 
 std::string setting_text(const PrecomputeOptions& setting) {
@@ -149,8 +143,9 @@ json write_difference_images(const std::vector<SettingResult>& results,
   const PrecomputeOptions& setting = results[drrs.front().result].setting;
   // The setting's reading of the CT is the one in force.
   const NodeCt ct = read_ct_per_node(
-      setting.ct.empty() ? read_study(setting.study).find_case(setting.case_name).ct.string()
-                         : setting.ct,
+      setting.ct.empty()
+          ? shared_study(setting.study, world)->find_case(setting.case_name).ct.string()
+          : setting.ct,
       setting.ct_reading,
       setting.attenuation,
       world,
@@ -159,25 +154,27 @@ json write_difference_images(const std::vector<SettingResult>& results,
   Image2d reference;
   for (const SweepDrr& drr : drrs) {
     const auto field = read_field(results[drr.result].setting.output, world);
-    if (!world.is_root()) continue;
-    const View view = View::whole_detector(field->identity.camera);
-    const RigidTransform pose = pose_from_parameters(
-        field->identity.frame, results[drr.result].comparisons[drr.pose].parameters);
-    field_images.push_back(render_image(TwoPassAfDrr(field), pose, view));
-    if (reference.pixels.empty())
-      reference = render_image(RayCastDrr(ct.volume, {drr_step_mm}), pose, view);
+    do_on_root(world, [&] {
+      const View view = View::whole_detector(field->identity.camera);
+      const RigidTransform pose = pose_from_parameters(
+          field->identity.frame, results[drr.result].comparisons[drr.pose].parameters);
+      field_images.push_back(render_image(TwoPassAfDrr(field), pose, view));
+      if (reference.pixels.empty())
+        reference = render_image(RayCastDrr(ct.volume, {drr_step_mm}), pose, view);
+    });
   }
-  return all_or_none(world, [&]() -> json {
-    if (!world.is_root()) return nullptr;
+  json written;
+  do_on_root(world, [&] {
     write_files(results, drrs, panels_of(results, drrs, field_images, reference), folder);
     json images = json::array();
     for (const SweepDrr& drr : drrs)
       images.push_back({{"psnr_db", results[drr.result].comparisons[drr.pose].psnr_db}});
-    return {{"file", "difference-images.png"},
-            {"target", results[drrs.front().result].target()},
-            {"pose_index", drrs.front().pose},
-            {"images", images}};
+    written = {{"file", "difference-images.png"},
+               {"target", results[drrs.front().result].target()},
+               {"pose_index", drrs.front().pose},
+               {"images", images}};
   });
+  return written;
 }
 
 }  // namespace af::evaluation

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <tuple>
 #include <vector>
 
 #include "evaluate/sweeps/field_parameter_tables.h"
@@ -14,6 +15,9 @@ namespace af::evaluation {
 struct SweepDrr {
   std::size_t result = 0;
   std::size_t pose = 0;
+
+  auto members() { return std::tie(result, pose); }
+  bool operator==(const SweepDrr&) const = default;
 };
 
 /// For each PSNR level, the setting nearest to it. All are of one target and pose: those with the

@@ -21,6 +21,7 @@
 #include "files/output_file.h"
 #include "files/sha256.h"
 #include "geometry/target_box.h"
+#include "ranks/root_only.h"
 #include "ranks/run_folder.h"
 #include "study/case_gold_standard.h"
 #include "study/shared_inputs.h"
@@ -253,9 +254,9 @@ void run_similarity_curves(const SimilarityCurvesOptions& options,
                  options.resume.restarts},
                 world);
   run.open();
-  const Study study = shared_study(options.study, world);
+  const Shared<Study> study = shared_study(options.study, world);
   const StudyCase study_case =
-      all_or_none(world, [&] { return study.find_case(options.case_name); });
+      all_or_none(world, [&] { return study->find_case(options.case_name); });
   const GoldStandard gold =
       all_or_none(world, [&] { return gold_standard(study, study_case, options.gold); });
   SimilarityCurvesOptions in_force = all_or_none(world, [&] { return options.in_force(); });
@@ -266,9 +267,7 @@ void run_similarity_curves(const SimilarityCurvesOptions& options,
   std::vector<LoadedMethod> methods = load_methods(options, {}, study, study_case, world, inputs);
   provenance.inputs = inputs.identities;
   provenance.input_notes = inputs.notes;
-  all_or_none(world, [&] {
-    if (world.is_root()) provenance.inputs["study"] = sha256_of_file(study.path.string());
-  });
+  do_on_root(world, [&] { provenance.inputs["study"] = sha256_of_file(study->path.string()); });
   std::vector<Curve> curves = empty_curves(options);
   measure_curves(methods,
                  PoseFrame::about(gold.room_from_ct, study_case.center_ct_mm),
@@ -276,8 +275,7 @@ void run_similarity_curves(const SimilarityCurvesOptions& options,
                  deciding_values(deciding_options(in_force), provenance.inputs),
                  world,
                  curves);
-  all_or_none(world, [&] {
-    if (!world.is_root()) return;
+  do_on_root(world, [&] {
     find_peaks(curves);
     const double radius_mm = rms_radius_mm(study_case.target_box_ct, study_case.center_ct_mm);
     run.begin_results();

@@ -16,6 +16,7 @@
 #include "files/sha256.h"
 #include "geometry/target_box.h"
 #include "ranks/provenance.h"
+#include "ranks/root_only.h"
 #include "study/case_gold_standard.h"
 #include "study/study_file.h"
 
@@ -139,8 +140,7 @@ namespace {
 void run_error_budget(const ErrorBudgetOptions& options,
                       const std::string& command_line,
                       const Communicator& world) {
-  all_or_none(world, [&] {
-    if (!world.is_root()) return;
+  do_on_root(world, [&] {
     announce_outputs(options.output_folder,
                      {"error-budget.md", "error-budget.csv", "reproduce.sh", "summary.json"});
     std::vector<ChainRun> runs;

@@ -21,6 +21,7 @@
 #include "geometry/target_box.h"
 #include "geometry/tre.h"
 #include "ranks/progress_printer.h"
+#include "ranks/root_only.h"
 #include "study/case_gold_standard.h"
 #include "study/shared_inputs.h"
 
@@ -190,9 +191,9 @@ void run_lattice_errors(const LatticeErrorsOptions& options,
     announce_output(csv);
     announce_output(options.output);
   });
-  const Study study = shared_study(options.study, world);
+  const Shared<Study> study = shared_study(options.study, world);
   const StudyCase study_case =
-      all_or_none(world, [&] { return study.find_case(options.case_name); });
+      all_or_none(world, [&] { return study->find_case(options.case_name); });
   const GoldStandard gold =
       all_or_none(world, [&] { return gold_standard(study, study_case, options.gold); });
   // Ray casting is loaded in any case: it makes the X-rays.
@@ -202,8 +203,7 @@ void run_lattice_errors(const LatticeErrorsOptions& options,
   const std::vector<LoadedMethod> methods =
       load_methods(loading, {}, study, study_case, world, ignored);
   const std::vector<CellView> views = cells_of(study, study_case, options, world);
-  all_or_none(world, [&] {
-    if (!world.is_root()) return;
+  do_on_root(world, [&] {
     const std::vector<LatticePose> poses = lattice_poses(
         cell_steps(views, gold.room_from_ct * study_case.center_ct_mm), options.fractions);
     const std::vector<LatticeEnds> ends =

@@ -26,6 +26,7 @@
 #include "files/resource_check.h"
 #include "precompute/precompute_field.h"
 #include "ranks/progress_printer.h"
+#include "ranks/root_only.h"
 #include "ranks/run_folder.h"
 #include "ranks/terminal.h"
 #include "register/case_loading.h"
@@ -80,7 +81,8 @@ std::shared_ptr<const CompressedAttenuationField> field_of(const PrecomputeOptio
                                                            const std::string& command_line,
                                                            const Communicator& world,
                                                            FieldFileInfo& info) {
-  const bool exists = all_or_none(world, [&] { return std::filesystem::exists(setting.output); });
+  const bool exists =
+      on_root(world, [&] { return std::filesystem::exists(setting.output); }).share();
   if (!exists) run_precompute(setting, command_line, world);
   auto field = read_field(setting.output, world, &info);
   all_or_none(world, [&] {
@@ -323,10 +325,8 @@ void run_field_parameters(const FieldParametersOptions& options,
   RunFolder run({options.output_folder, {"reproduce.sh", "summary.json"}, options.resume.restarts},
                 world);
   run.open();
-  const std::vector<Target> targets = all_or_none(world, [&] {
-    if (world.is_root()) make_folder(fields);
-    return targets_of(options);
-  });
+  do_on_root(world, [&] { make_folder(fields); });
+  const std::vector<Target> targets = all_or_none(world, [&] { return targets_of(options); });
   Provenance provenance = {"af-evaluate field-parameters",
                            command_line,
                            to_toml(options),
@@ -338,8 +338,7 @@ void run_field_parameters(const FieldParametersOptions& options,
     sweep_target(options, target, fields, command_line, run, world, results, provenance);
   const json difference_images =
       write_difference_images(results, options.reference.step_mm, options.output_folder, world);
-  all_or_none(world, [&] {
-    if (!world.is_root()) return;
+  do_on_root(world, [&] {
     write_results(options, results, difference_images, run, provenance);
     draw_results({options.output_folder.string()}, world);
   });

@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "base/stored_bytes.h"
+#include "ranks/root_only.h"
 
 namespace af {
 
@@ -35,23 +36,21 @@ TrainingJournal::TrainingJournal(UnfinishedWork work,
                                  const CodebookOptions& options,
                                  const Communicator& communicator)
     : communicator_(communicator), store_(giving_way(std::move(work)), communicator) {
-  std::vector<std::byte> last;
-  all_or_none(communicator_, [&] {
-    if (!communicator_.is_root()) return;
+  const auto read_last = [&] {
+    std::vector<std::byte> last;
     store_.visit([&](std::int64_t, std::span<const std::byte> training) {
       last.assign(training.begin(), training.end());
     });
-  });
-  communicator_.broadcast(last);
-  begun_ = training_of(last);
+    return last;
+  };
+  begun_ = training_of(*on_root(communicator_, read_last).share());
   if (begun_ && (begun_->codebook.size() != static_cast<std::size_t>(options.codewords) ||
                  begun_->codebook.mean_step != options.mean_step))
     begun_.reset();
 }
 
 void TrainingJournal::append(const TrainedCodebook& so_far) {
-  all_or_none(communicator_, [&] {
-    if (!communicator_.is_root()) return;
+  do_on_root(communicator_, [&] {
     store_.shard().append(static_cast<std::int64_t>(so_far.iterations.size()), {bytes_of(so_far)});
     store_.shard().sync();
   });

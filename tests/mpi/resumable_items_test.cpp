@@ -53,6 +53,16 @@ std::uint64_t completed(ResumableItems& items, const std::vector<std::int64_t>& 
   return done[0];
 }
 
+TEST(ProgressStore, EveryRankIsToldThatWorkOfOtherOptionsGaveWay) {
+  const Communicator world = Communicator::world();
+  const test::SharedFolder folder;
+  UnfinishedWork work = {folder / "p", "rows", kDecides};
+  work.gives_way = true;
+  EXPECT_FALSE(ProgressStore(work, world).has_replaced());
+  work.decides = {{"seed", "2"}};
+  EXPECT_TRUE(ProgressStore(work, world).has_replaced());
+}
+
 TEST(ResumableItems, GivesEveryResultToRankZeroOnce) {
   const Communicator world = Communicator::world();
   for (const std::int64_t count : {0, 1, 3, 2000}) {

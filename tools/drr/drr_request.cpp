@@ -18,6 +18,7 @@
 #include "files/resource_check.h"
 #include "files/shell_words.h"
 #include "geometry/camera_distance.h"
+#include "ranks/root_only.h"
 #include "ranks/terminal.h"
 #include "study/pose_file.h"
 #include "study/rig_file.h"
@@ -477,7 +478,7 @@ std::vector<std::string> problems(const DrrOptions& options) {
 
 void run_drr(const DrrOptions& options, const Communicator& world) {
   throw_if_any(problems(options));
-  if (world.is_root()) announce_output(options.output);
+  do_on_root(world, [&] { announce_output(options.output); });
   const DrrScene scene = load_scene(options, world);
   std::vector<std::string> notes = scene.warnings;
   const std::vector<RigidTransform> poses = requested_poses(options, scene, notes);

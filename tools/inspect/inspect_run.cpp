@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "ranks/root_only.h"
 #include "study/study_template.h"
 #include "tools/inspect/inspection.h"
 
@@ -73,8 +74,7 @@ void run_inspect(const InspectOptions& options, const Communicator& world) {
   }
   if (!options.pictures.empty()) {
     for (const std::string& path : options.paths) {
-      all_or_none(world, [&] {
-        if (!world.is_root()) return;
+      do_on_root(world, [&] {
         const DrawnPictures drawn = draw_pictures(path, options.ct, options.pictures);
         std::cout << drawn.text << std::flush;
         throw_if_any(drawn.problems);

@@ -2,7 +2,9 @@
 #include "base/stored_bytes.h"
 
 #include <cmath>
+#include <filesystem>
 #include <limits>
+#include <map>
 #include <optional>
 
 #include <Eigen/Geometry>
@@ -30,8 +32,10 @@ struct Outer {
   std::vector<Inner> list;
   std::optional<Inner> given;
   std::optional<Inner> missing;
+  std::filesystem::path path;
+  std::map<std::string, Inner> named;
   auto members() {
-    return std::tie(large, is_set, colour, text, numbers, pose, list, given, missing);
+    return std::tie(large, is_set, colour, text, numbers, pose, list, given, missing, path, named);
   }
 };
 
@@ -45,6 +49,8 @@ Outer example() {
   outer.pose.translate(Eigen::Vector3d(1.0, 2.0, 1.0 / 3));
   outer.list = {{1, {}}, {2, {std::numeric_limits<double>::infinity(), 5.0}}};
   outer.given = Inner{7, {0.5}};
+  outer.path = "folder/./file.toml";
+  outer.named = {{"", {3, {}}}, {"two", {4, {1.5}}}};
   return outer;
 }
 
@@ -65,6 +71,10 @@ TEST(StoredBytes, KeepEveryBitOfEveryMember) {
   ASSERT_TRUE(back.given.has_value());
   EXPECT_EQ(back.given->count, 7);
   EXPECT_FALSE(back.missing.has_value());
+  EXPECT_EQ(back.path.native(), "folder/./file.toml");
+  ASSERT_EQ(back.named.size(), 2u);
+  EXPECT_EQ(back.named.at("").count, 3);
+  EXPECT_EQ(back.named.at("two").values, (std::vector<double>{1.5}));
   EXPECT_EQ(bytes_of(back), bytes_of(example()));
 }
 
