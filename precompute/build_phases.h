@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "precompute/build/field_build.h"
+#include "precompute/codebook/codebook_training.h"
+#include "precompute/codebook/filter_fitting.h"
 #include "precompute/precompute_run.h"
 #include "precompute/sized_field.h"
 #include "ranks/deciding_values.h"

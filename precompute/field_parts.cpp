@@ -88,6 +88,18 @@ std::vector<FieldPart> parts_of_orbit(const FieldSource& source,
   return parts;
 }
 
+/// Collective.
+std::shared_ptr<const SlabAlignedVolume> resampled_on_node(const AttenuationVolume& volume,
+                                                           const RigidTransform& slab_from_ct,
+                                                           const Communicator& communicator) {
+  const SlabAlignedLayout layout =
+      all_or_none(communicator, [&] { return slab_aligned_layout(volume, slab_from_ct); });
+  return std::make_shared<const SlabAlignedVolume>(
+      volume, slab_from_ct, layout, [&](std::size_t bytes, const SlabAlignedFill& fill) {
+        return communicator.allocate_on_node_together(bytes, fill);
+      });
+}
+
 /// Of line integrals of the part's CT, with what measured X-rays show beyond it.
 std::unique_ptr<const FieldCaster> line_integral_caster(const FieldPart& part,
                                                         const LightSlab& planes,
@@ -136,6 +148,19 @@ std::vector<FieldPart> field_parts(const FieldSource& source,
            communicator, [&] { return listed_cameras(source, options.orbit_cameras, rig); })) {
     parts.push_back({source, source.range, {}, {}});
     parts.back().source.camera = camera;
+  }
+  return parts;
+}
+
+std::vector<FieldPart> with_resampled_ct(std::vector<FieldPart> parts,
+                                         WorkNote& note,
+                                         const Communicator& communicator) {
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    note.change(parts.size() == 1 ? "resampling the CT"
+                                  : "resampling the CT for " + std::to_string(i + 1) + " of " +
+                                        std::to_string(parts.size()) + " fields");
+    parts[i].resampled =
+        resampled_on_node(*parts[i].source.volume, parts[i].light_slab.slab_from_ct, communicator);
   }
   return parts;
 }

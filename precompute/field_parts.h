@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The fields that af-precompute makes: one field or the members of an atlas, each with its planes,
-// and one caster for all.
+// The fields that af-precompute makes: one field or the members of an atlas, each with its planes
+// and the CT along their axes, and one caster for all.
 #pragma once
 
 #include <memory>
@@ -14,6 +14,7 @@
 #include "precompute/casting/work_unit.h"
 #include "precompute/field_source.h"
 #include "ranks/communicator.h"
+#include "ranks/work_watch.h"
 
 namespace af {
 
@@ -31,6 +32,12 @@ struct FieldPart {
 std::vector<FieldPart> field_parts(const FieldSource& source,
                                    const PrecomputeOptions& options,
                                    const Communicator& communicator);
+
+/// Collective. Every part, its planes known, with the CT in its slab frame, held once per node; the
+/// ranks of a node share the work.
+std::vector<FieldPart> with_resampled_ct(std::vector<FieldPart> parts,
+                                         WorkNote& note,
+                                         const Communicator& communicator);
 
 /// The slabs of all parts, those of the first part first.
 FieldLattice lattice_of(const std::vector<FieldPart>& parts);

@@ -33,18 +33,6 @@ bool has_one_central_slab(const PrecomputeOptions& options) {
   return options.design().slabs == 1 && options.st_plane_rule() == StPlane::Centre;
 }
 
-/// Collective.
-std::shared_ptr<const SlabAlignedVolume> resampled_on_node(const AttenuationVolume& volume,
-                                                           const RigidTransform& slab_from_ct,
-                                                           const Communicator& communicator) {
-  const SlabAlignedLayout layout =
-      all_or_none(communicator, [&] { return slab_aligned_layout(volume, slab_from_ct); });
-  return std::make_shared<const SlabAlignedVolume>(
-      volume, slab_from_ct, layout, [&](std::size_t bytes, const SlabAlignedFill& fill) {
-        return communicator.allocate_on_node_together(bytes, fill);
-      });
-}
-
 int st_nodes_at_most_apart(const std::vector<FieldPart>& parts, double spacing_mm) {
   constexpr int kMultiple = 32;
   double longest_mm = 0.0;
@@ -121,19 +109,6 @@ std::vector<FieldPart> with_planes(std::vector<FieldPart> parts,
 bool needs_resampled_ct(const PrecomputeOptions& options) {
   return caster_named(options.caster).needs_resampled || options.needs_probe() ||
          !has_one_central_slab(options);
-}
-
-std::vector<FieldPart> with_resampled_ct(std::vector<FieldPart> parts,
-                                         WorkNote& note,
-                                         const Communicator& communicator) {
-  for (std::size_t i = 0; i < parts.size(); ++i) {
-    note.change(parts.size() == 1 ? "resampling the CT"
-                                  : "resampling the CT for " + std::to_string(i + 1) + " of " +
-                                        std::to_string(parts.size()) + " fields");
-    parts[i].resampled =
-        resampled_on_node(*parts[i].source.volume, parts[i].light_slab.slab_from_ct, communicator);
-  }
-  return parts;
 }
 
 std::vector<FieldPart> cut_into_slabs(std::vector<FieldPart> parts,

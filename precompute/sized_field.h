@@ -12,7 +12,6 @@
 #include "precompute/design_choice.h"
 #include "precompute/field_parts.h"
 #include "precompute/precompute_run.h"
-#include "ranks/work_watch.h"
 
 namespace af {
 
@@ -43,12 +42,6 @@ std::vector<FieldPart> with_planes(std::vector<FieldPart> parts,
 
 /// Whether the caster, a probe or the cut into slabs reads the resampled CT.
 bool needs_resampled_ct(const PrecomputeOptions& options);
-
-/// Collective. Every part with the CT in its slab frame, held once per node; the ranks of a node
-/// share the work.
-std::vector<FieldPart> with_resampled_ct(std::vector<FieldPart> parts,
-                                         WorkNote& note,
-                                         const Communicator& communicator);
 
 /// Collective. Every part cut into the depth slabs of the options' design, with planes for them;
 /// the resampled CT is let go where the caster does not need it. Errors of choose_depth_slabs().
