@@ -100,14 +100,15 @@ double BuildRecord::rms_error() const {
 }
 
 void add_record(const BuildRecord& record, json& provenance) {
-  provenance["training"] = training_json(record.trained);
-  if (record.fitted.filter) provenance["tile_filter"] = filter_json(record.fitted, record.step);
+  provenance["training"] = training_json(record.trained.training);
+  if (record.trained.fitted.filter)
+    provenance["tile_filter"] = filter_json(record.trained.fitted, record.step);
   if (record.design) provenance["design"] = design_json(*record.design);
   provenance["occupied_tiles"] = record.cast.occupied_tiles;
   provenance["rms_attenuation_error"] = record.rms_error();
   provenance["rays_cast"] = record.cast.rays_cast;
   provenance["units_resumed"] = record.cast.units_resumed;
-  provenance["training_iterations_resumed"] = record.iterations_resumed;
+  provenance["training_iterations_resumed"] = record.trained.iterations_resumed;
   provenance["units_encoded_before"] = record.units_encoded_before;
   provenance["units_kept_in_memory"] = record.cast.units_kept;
   provenance["busy_seconds"] = {{"cast", record.cast.busy_seconds},
@@ -125,10 +126,11 @@ std::string record_text(const BuildRecord& record,
   const auto raw_bytes = static_cast<double>(2 * stored_nodes);
   std::ostringstream text;
   text.precision(3);
-  text << training_text(record.trained, record.step) << filter_text(record.fitted, record.step)
+  text << training_text(record.trained.training, record.step)
+       << filter_text(record.trained.fitted, record.step)
        << "\nwhole field: " << static_cast<double>(record.cast.occupied_tiles) / 1e6
        << " million tiles not empty, rms error " << record.rms_error() << " (total attenuation"
-       << (record.fitted.filter ? ", before the filter" : "")
+       << (record.trained.fitted.filter ? ", before the filter" : "")
        << ")\nseconds: " << seconds_text(record.clock.phases()) << "; cast " << rate
        << " million rays/s on " << record.encode_seconds.size()
        << " ranks\nbalance (mean / slowest rank): cast " << balance_of(record.cast.busy_seconds)

@@ -8,9 +8,7 @@
 #include <vector>
 
 #include "field/field_file.h"
-#include "precompute/build/field_build.h"
-#include "precompute/codebook/codebook_training.h"
-#include "precompute/codebook/filter_fitting.h"
+#include "precompute/build_phases.h"
 #include "precompute/design_choice.h"
 #include "precompute/phase_clock.h"
 #include "ranks/provenance.h"
@@ -19,15 +17,13 @@ namespace af {
 
 struct BuildRecord {
   const CastPhase& cast;
-  const TrainedCodebook& trained;
-  const FittedFilter& fitted;
+  const TrainedField& trained;
   const std::optional<DesignChoice>& design;
   const PhaseClock& clock;
   float step = 0.0F;                       ///< total attenuation of one level
   std::uint64_t squared_error = 0;         ///< of all tiles, in squared levels
   std::vector<double> encode_seconds;      ///< of every rank
   std::uint64_t units_encoded_before = 0;  ///< by earlier runs
-  std::size_t iterations_resumed = 0;      ///< of the training, by earlier runs
   std::uint64_t peak_bytes_per_rank = 0;   ///< beside the CT and its grid
   std::uint64_t volume_bytes = 0;          ///< of the CT and its grid, once per node
 

@@ -6,6 +6,8 @@
 #include "precompute/build/field_build.h"
 #include "precompute/design/design_probe.h"
 #include "precompute/formatted_text.h"
+#include "ranks/terminal.h"
+#include "ranks/work_watch.h"
 
 namespace af {
 
@@ -31,12 +33,10 @@ std::string forecast_text(const DesignForecast& forecast) {
          to_text(forecast.design);
 }
 
-}  // namespace
-
+/// Collective.
 DesignChoice choose_design(const FieldSource& source,
                            const SlabAlignedVolume& resampled,
                            const PrecomputeOptions& options,
-                           const AttenuationQuantizer& quantizer,
                            const Communicator& communicator) {
   const auto start = std::chrono::steady_clock::now();
   const CodebookReduction reduction = reduction_over(communicator);
@@ -46,7 +46,7 @@ DesignChoice choose_design(const FieldSource& source,
                    source.camera,
                    source.frame,
                    source.range,
-                   quantizer,
+                   source.quantizer(),
                    std::nullopt,
                    options.caster,
                    options.ray_caster,
@@ -77,6 +77,7 @@ DesignChoice choose_design(const FieldSource& source,
   return choice;
 }
 
+/// The text printed about a choice.
 std::string choice_text(const DesignChoice& choice) {
   std::string text =
       "design for " + choice.asked + formatted(", by a probe of %.1f s\n", choice.seconds);
@@ -85,6 +86,21 @@ std::string choice_text(const DesignChoice& choice) {
   if (choice.chosen.runner_up.design.slabs > 0)
     text += "  second    " + forecast_text(choice.chosen.runner_up) + "\n";
   return text + "  chosen    " + forecast_text(choice.chosen.forecast);
+}
+
+}  // namespace
+
+std::optional<DesignChoice> chosen_design(const std::vector<FieldPart>& parts,
+                                          const PrecomputeOptions& options,
+                                          PrecomputeRun& run) {
+  if (!options.needs_probe()) return std::nullopt;
+  const WorkNote note("probing designs", WorkNote::Kind::Phase);
+  const FieldPart& part = parts[parts.size() / 2];
+  DesignChoice choice = all_or_none(
+      run.world, [&] { return choose_design(part.source, *part.resampled, options, run.world); });
+  inform(run.world, choice_text(choice));
+  run.clock.end("probe");
+  return choice;
 }
 
 }  // namespace af

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <string>
+#include <vector>
 
-#include "field/attenuation_quantizer.h"
 #include "precompute/design/design_search.h"
-#include "precompute/field_source.h"
-#include "ranks/communicator.h"
+#include "precompute/field_parts.h"
+#include "precompute/precompute_run.h"
 
 namespace af {
 
@@ -17,16 +18,11 @@ struct DesignChoice {
   double seconds = 0.0;  ///< that the probe took
 };
 
-/// Collective. Chooses what the options leave open of the design, by a probe of the CT; the same on
-/// every rank and on any number of them. `resampled`: in the field's frame. Errors of
-/// search_design().
-DesignChoice choose_design(const FieldSource& source,
-                           const SlabAlignedVolume& resampled,
-                           const PrecomputeOptions& options,
-                           const AttenuationQuantizer& quantizer,
-                           const Communicator& communicator);
-
-/// The text printed about a choice.
-std::string choice_text(const DesignChoice& choice);
+/// Collective. Chooses what the options leave open of the design, by a probe of the CT, where there
+/// is anything: one design for all members of an atlas, by what one needs; the same on every rank
+/// and on any number of them. `parts`: with the resampled CT. Errors of search_design().
+std::optional<DesignChoice> chosen_design(const std::vector<FieldPart>& parts,
+                                          const PrecomputeOptions& options,
+                                          PrecomputeRun& run);
 
 }  // namespace af

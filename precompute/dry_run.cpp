@@ -2,20 +2,55 @@
 #include "precompute/dry_run.h"
 
 #include <algorithm>
+#include <cstdint>
+#include <filesystem>
+#include <iostream>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "base/joined.h"
+#include "precompute/build/field_build.h"
+#include "precompute/build/memory_plan.h"
+#include "precompute/build/speed_sample.h"
+#include "precompute/casting/casters.h"
 #include "precompute/design/quantisation_probe.h"
 #include "precompute/formatted_text.h"
 
 namespace af {
 
-double FieldForecast::all_seconds() const {
-  double all = 0.0;
-  for (const auto& [phase, of_phase] : seconds) all += of_phase;
-  return all;
-}
-
 namespace {
+
+/// What a forecast is made from.
+struct DryRun {
+  const SizedField& field;
+  std::vector<WorkUnit> units;
+  SpeedSample speed;  ///< of one rank
+  DiskSample disk;    ///< of the folder that holds unfinished work
+  MemoryPlan memory;
+  PhaseSeconds past;  ///< phases that a dry run goes through itself: reading and resampling
+  int ranks = 1;
+};
+
+/// What the field would need.
+struct FieldForecast {
+  std::uint64_t uncropped_bytes = 0;                ///< all nodes of the lattice at 16 bits
+  std::uint64_t cropped_bytes = 0;                  ///< stored nodes at 16 bits
+  std::uint64_t payload_bytes = 0;                  ///< indices and codebook
+  std::uint64_t file_bytes = 0;                     ///< about: empty tiles compress away
+  std::uint64_t tile_bytes = 0;                     ///< of tiles that are not empty, over all ranks
+  std::uint64_t kept_bytes = 0;                     ///< of them in memory
+  TileOverflow overflow = TileOverflow::CastAgain;  ///< of the rest
+  std::uint64_t limit_bytes = 0;                    ///< of memory, per rank
+  std::uint64_t bytes_per_rank = 0;
+  PhaseSeconds seconds;
+
+  [[nodiscard]] double all_seconds() const {
+    double all = 0.0;
+    for (const auto& [phase, of_phase] : seconds) all += of_phase;
+    return all;
+  }
+};
 
 /// Tiles of a field and how many are worked on.
 struct TileCounts {
@@ -24,9 +59,9 @@ struct TileCounts {
   double training = 0.0;  ///< with those held out
 
   TileCounts(const DryRun& run)
-      : all(static_cast<double>(run.lattice.tile_count())),
+      : all(static_cast<double>(run.field.lattice.tile_count())),
         occupied(all * run.speed.occupied_fraction),
-        training(training_tiles(run.options.training_selection())) {}
+        training(training_tiles(run.field.options.training_selection())) {}
 
  private:
   [[nodiscard]] double training_tiles(const TrainingSelection& selection) const {
@@ -45,7 +80,7 @@ double seconds_at(double amount, double per_second) {
 }
 
 void forecast_memory(const DryRun& run, const TileCounts& tiles, FieldForecast& need) {
-  need.limit_bytes = memory_limit(run.options, run.memory);
+  need.limit_bytes = memory_limit(run.field.options, run.memory);
   const std::uint64_t kept_per_rank = run.memory.kept_tile_bytes(need.limit_bytes);
   need.tile_bytes = static_cast<std::uint64_t>(sizeof(Tile) * tiles.occupied);
   need.kept_bytes =
@@ -55,17 +90,18 @@ void forecast_memory(const DryRun& run, const TileCounts& tiles, FieldForecast& 
   // The same rule as in choose_overflow(): ranks share the disk, but not the casting.
   const double cast_bytes_per_second =
       2.0 * run.speed.rays_per_second * run.speed.occupied_fraction * run.ranks;
-  if (run.options.has_checkpoint && run.disk.read_bytes_per_second >= cast_bytes_per_second)
+  if (run.field.options.has_checkpoint && run.disk.read_bytes_per_second >= cast_bytes_per_second)
     need.overflow = TileOverflow::ReadBack;
 }
 
 void forecast_seconds(const DryRun& run, const TileCounts& tiles, FieldForecast& need) {
   const SpeedSample& speed = run.speed;
   const auto tile_bytes = static_cast<double>(need.tile_bytes);
-  const double cast_seconds =
-      static_cast<double>(run.lattice.stored_node_count()) / speed.rays_per_second / run.ranks;
-  const double checkpoint_seconds =
-      run.options.has_checkpoint ? seconds_at(tile_bytes, run.disk.write_bytes_per_second) : 0.0;
+  const double cast_seconds = static_cast<double>(run.field.lattice.stored_node_count()) /
+                              speed.rays_per_second / run.ranks;
+  const double checkpoint_seconds = run.field.options.has_checkpoint
+                                        ? seconds_at(tile_bytes, run.disk.write_bytes_per_second)
+                                        : 0.0;
   // Most trainings end after about so many iterations.
   constexpr double kIterations = 10.0;
   const double overflow_fraction =
@@ -74,12 +110,13 @@ void forecast_seconds(const DryRun& run, const TileCounts& tiles, FieldForecast&
       need.overflow == TileOverflow::ReadBack
           ? seconds_at(overflow_fraction * tile_bytes, run.disk.read_bytes_per_second)
           : overflow_fraction * cast_seconds;
-  const double index_bytes = bytes_per_tile(run.options) * tiles.occupied;
+  const double index_bytes = bytes_per_tile(run.field.options) * tiles.occupied;
   const double compress_seconds = index_bytes * speed.compress_seconds_per_byte;
   // The file is read back: decoding takes as long as coding, SHA-256 some 2 ns a byte.
-  const double verify_seconds = compress_seconds + 2e-9 * bytes_per_tile(run.options) * tiles.all;
+  const double verify_seconds =
+      compress_seconds + 2e-9 * bytes_per_tile(run.field.options) * tiles.all;
   const double verifying_ranks =
-      std::min(static_cast<double>(run.ranks), static_cast<double>(run.lattice.slabs.size()));
+      std::min(static_cast<double>(run.ranks), static_cast<double>(run.field.lattice.slabs.size()));
   need.seconds = run.past;
   need.seconds.emplace_back("cast", cast_seconds + checkpoint_seconds);
   need.seconds.emplace_back(
@@ -166,7 +203,7 @@ std::string advice_text(const FieldPart& part, const PrecomputeOptions& options)
 }
 
 std::string memory_text(const DryRun& run, const FieldForecast& need) {
-  std::string text = "  memory             " + megabytes_text(run.volume_bytes) +
+  std::string text = "  memory             " + megabytes_text(run.field.volume_bytes()) +
                      " per node for the CT and its grid, up to " +
                      megabytes_text(need.bytes_per_rank) + " per rank (limit " +
                      megabytes_text(need.limit_bytes) + ")\n";
@@ -181,30 +218,29 @@ std::string memory_text(const DryRun& run, const FieldForecast& need) {
                       2e-6 * run.speed.rays_per_second * run.speed.occupied_fraction * run.ranks);
   }
   text += "\n";
-  if (run.options.has_checkpoint)
+  if (run.field.options.has_checkpoint)
     text += "  progress folder    " + megabytes_text(need.tile_bytes + need.payload_bytes) +
             " on disk until the field is complete\n";
   const std::uint64_t disk_bytes =
-      need.file_bytes + (run.options.has_checkpoint ? need.tile_bytes + need.payload_bytes : 0);
+      need.file_bytes +
+      (run.field.options.has_checkpoint ? need.tile_bytes + need.payload_bytes : 0);
   text += "  disk               " + megabytes_text(run.disk.available_bytes) + " left for " +
           megabytes_text(disk_bytes) +
           (disk_bytes > run.disk.available_bytes ? ": NOT ENOUGH\n" : "\n");
   return text;
 }
 
-}  // namespace
-
 FieldForecast forecast(const DryRun& run) {
   const TileCounts tiles(run);
-  const double codebook_bytes = 32.0 * run.options.design().codewords;
+  const double codebook_bytes = 32.0 * run.field.options.design().codewords;
   FieldForecast need;
-  need.uncropped_bytes = 2 * static_cast<std::uint64_t>(run.lattice.node_count());
-  need.cropped_bytes = 2 * static_cast<std::uint64_t>(run.lattice.stored_node_count());
+  need.uncropped_bytes = 2 * static_cast<std::uint64_t>(run.field.lattice.node_count());
+  need.cropped_bytes = 2 * static_cast<std::uint64_t>(run.field.lattice.stored_node_count());
   need.payload_bytes =
-      static_cast<std::uint64_t>(bytes_per_tile(run.options) * tiles.all + codebook_bytes);
+      static_cast<std::uint64_t>(bytes_per_tile(run.field.options) * tiles.all + codebook_bytes);
   need.file_bytes = static_cast<std::uint64_t>(
-      bytes_per_tile(run.options) * run.speed.compressed_fraction * tiles.occupied +
-      kFileBytesPerCodeword * run.options.design().codewords);
+      bytes_per_tile(run.field.options) * run.speed.compressed_fraction * tiles.occupied +
+      kFileBytesPerCodeword * run.field.options.design().codewords);
   forecast_memory(run, tiles, need);
   forecast_seconds(run, tiles, need);
   return need;
@@ -216,15 +252,15 @@ std::string dry_run_text(const DryRun& run) {
     return static_cast<double>(raw) / static_cast<double>(stored);
   };
   std::string text =
-      "Field of camera " + run.source.camera.name + " for " + run.source.ct_path + "\n";
-  text += "  range              " + run.source.range.text() + "\n";
-  if (run.options.is_atlas()) text += parts_text(run.parts);
-  text += planes_text(run.parts.front().light_slab);
+      "Field of camera " + run.field.source.camera.name + " for " + run.field.source.ct_path + "\n";
+  text += "  range              " + run.field.source.range.text() + "\n";
+  if (run.field.options.is_atlas()) text += parts_text(run.field.parts);
+  text += planes_text(run.field.parts.front().light_slab);
   text += formatted("  rays               %.1f million stored of %.1f million\n",
-                    static_cast<double>(run.lattice.stored_node_count()) / 1e6,
-                    static_cast<double>(run.lattice.node_count()) / 1e6);
+                    static_cast<double>(run.field.lattice.stored_node_count()) / 1e6,
+                    static_cast<double>(run.field.lattice.node_count()) / 1e6);
   text += formatted("  tiles              %.2f million, about %.0f %% not empty\n",
-                    static_cast<double>(run.lattice.tile_count()) / 1e6,
+                    static_cast<double>(run.field.lattice.tile_count()) / 1e6,
                     100.0 * run.speed.occupied_fraction);
   text += formatted("  work               %zu units on %d ranks\n", run.units.size(), run.ranks);
   text += memory_text(run, need);
@@ -243,7 +279,37 @@ std::string dry_run_text(const DryRun& run) {
                 need.all_seconds(),
                 seconds_text(need.seconds).c_str(),
                 run.speed.rays_per_second / 1e6);
-  return text + advice_text(run.parts.front(), run.options);
+  return text + advice_text(run.field.parts.front(), run.field.options);
+}
+
+std::filesystem::path output_folder(const PrecomputeOptions& options) {
+  const std::filesystem::path output(options.output);
+  return output.has_parent_path() ? output.parent_path() : ".";
+}
+
+}  // namespace
+
+void print_dry_run(const SizedField& field, const FieldCaster& caster, const PrecomputeRun& run) {
+  constexpr double kSampleSeconds = 1.0;
+  const int ranks = run.world.size();
+  const PlanOptions plan = field.unit_plan(ranks);
+  std::vector<WorkUnit> units = plan_units(field.lattice, plan);
+  const MemoryPlan memory = memory_plan(field, units, run);
+  all_or_none(run.world, [&] {
+    if (!run.world.is_root()) return;
+    // The units that are cast to measure the speed.
+    const PlanOptions small = caster_named(field.options.caster).sample;
+    const PlanOptions sample = small.rays_per_unit < plan.rays_per_unit ? small : plan;
+    const SpeedSample speed =
+        sample_speed(caster, field.lattice, sample, field.options, kSampleSeconds);
+    std::cout << dry_run_text({field,
+                               std::move(units),
+                               speed,
+                               sample_disk(output_folder(field.options)),
+                               memory,
+                               run.clock.phases(),
+                               ranks});
+  });
 }
 
 }  // namespace af

@@ -1,22 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "precompute/field_parts.h"
 
-#include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "base/error.h"
 #include "base/stored_bytes.h"
-#include "files/toml_reader.h"
 #include "geometry/orbit.h"
-#include "geometry/slab_sizing.h"
 #include "precompute/build/orbit_text.h"
 #include "precompute/casting/casters.h"
 #include "precompute/casting/corrected_caster.h"
 #include "precompute/casting/joined_caster.h"
 #include "precompute/casting/least_squares_caster.h"
 #include "precompute/casting/unit_costs.h"
-#include "precompute/formatted_text.h"
 #include "study/rig_file.h"
 #include "study/shared_inputs.h"
 
@@ -93,11 +88,23 @@ std::vector<FieldPart> parts_of_orbit(const FieldSource& source,
   return parts;
 }
 
+/// Collective.
+std::shared_ptr<const SlabAlignedVolume> resampled_on_node(const AttenuationVolume& volume,
+                                                           const RigidTransform& slab_from_ct,
+                                                           const Communicator& communicator) {
+  const SlabAlignedLayout layout =
+      all_or_none(communicator, [&] { return slab_aligned_layout(volume, slab_from_ct); });
+  return std::make_shared<const SlabAlignedVolume>(
+      volume, slab_from_ct, layout, [&](std::size_t bytes, const SlabAlignedFill& fill) {
+        return communicator.allocate_on_node_together(bytes, fill);
+      });
+}
+
 /// Of line integrals of the part's CT, with what measured X-rays show beyond it.
 std::unique_ptr<const FieldCaster> line_integral_caster(const FieldPart& part,
                                                         const LightSlab& planes,
-                                                        const PrecomputeOptions& options,
-                                                        const AttenuationQuantizer& quantizer) {
+                                                        const PrecomputeOptions& options) {
+  const AttenuationQuantizer quantizer = part.source.quantizer();
   std::unique_ptr<const FieldCaster> of_ct =
       caster_named(options.caster)
           .make({*part.source.volume, part.resampled.get(), planes, quantizer, options.ray_caster});
@@ -112,10 +119,9 @@ std::unique_ptr<const FieldCaster> line_integral_caster(const FieldPart& part,
 }
 
 std::unique_ptr<const FieldCaster> caster_of_part(const FieldPart& part,
-                                                  const PrecomputeOptions& options,
-                                                  const AttenuationQuantizer& quantizer) {
+                                                  const PrecomputeOptions& options) {
   const auto of_planes = [&](const LightSlab& planes) {
-    return line_integral_caster(part, planes, options, quantizer);
+    return line_integral_caster(part, planes, options);
   };
   if (options.design().fits_uv)
     return std::make_unique<const LeastSquaresFieldCaster>(part.light_slab, of_planes);
@@ -146,42 +152,17 @@ std::vector<FieldPart> field_parts(const FieldSource& source,
   return parts;
 }
 
-LightSlab sized_planes(const FieldSource& source,
-                       const PrecomputeOptions& options,
-                       const MotionRange& range,
-                       const DepthSlabs& depth_slabs) {
-  const FieldDesign design = options.design();
-  return make_light_slab(source.camera,
-                         source.frame,
-                         range,
-                         source.volume->corner_points(),
-                         {design.uv_nodes,
-                          design.st_nodes,
-                          depth_slabs.boundaries_y_mm,
-                          depth_slabs.st_plane_y_mm,
-                          source.sources},
-                         source.more_cameras);
-}
-
-int st_nodes_at_most_apart(const std::vector<FieldPart>& parts, double spacing_mm) {
-  constexpr int kMultiple = 32;
-  double longest_mm = 0.0;
-  int present = 0;
-  for (const FieldPart& part : parts)
-    for (const SlabGeometry& slab : part.light_slab.slabs) {
-      longest_mm = std::max({longest_mm, slab.s.length_mm(), slab.t.length_mm()});
-      present = std::max({present, slab.s.nodes, slab.t.nodes});
-    }
-  const double nodes = std::ceil(longest_mm / spacing_mm) + 1.0;
-  if (nodes <= present) return present;
-  if (!(nodes <= kMostPlaneNodes))
-    throw InputError("--st-spacing-mm",
-                     toml_number(spacing_mm),
-                     "an (s,t) plane is " + formatted("%.1f", longest_mm) + " mm wide and has " +
-                         std::to_string(kMostPlaneNodes) + " nodes at most, " +
-                         formatted("%.4g", 1.001 * longest_mm / (kMostPlaneNodes - 1)) +
-                         " mm apart");
-  return (static_cast<int>(nodes) + kMultiple - 1) / kMultiple * kMultiple;
+std::vector<FieldPart> with_resampled_ct(std::vector<FieldPart> parts,
+                                         WorkNote& note,
+                                         const Communicator& communicator) {
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    note.change(parts.size() == 1 ? "resampling the CT"
+                                  : "resampling the CT for " + std::to_string(i + 1) + " of " +
+                                        std::to_string(parts.size()) + " fields");
+    parts[i].resampled =
+        resampled_on_node(*parts[i].source.volume, parts[i].light_slab.slab_from_ct, communicator);
+  }
+  return parts;
 }
 
 FieldLattice lattice_of(const std::vector<FieldPart>& parts) {
@@ -192,11 +173,10 @@ FieldLattice lattice_of(const std::vector<FieldPart>& parts) {
 }
 
 std::unique_ptr<const FieldCaster> make_caster(const std::vector<FieldPart>& parts,
-                                               const PrecomputeOptions& options,
-                                               const AttenuationQuantizer& quantizer) {
+                                               const PrecomputeOptions& options) {
   std::vector<std::unique_ptr<const FieldCaster>> casters;
   casters.reserve(parts.size());
-  for (const FieldPart& part : parts) casters.push_back(caster_of_part(part, options, quantizer));
+  for (const FieldPart& part : parts) casters.push_back(caster_of_part(part, options));
   if (casters.size() == 1) return std::move(casters.front());
   return std::make_unique<const JoinedCaster>(std::move(casters), slab_counts(parts));
 }

@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "base/joined.h"
 #include "files/shell_words.h"
+#include "ranks/terminal.h"
 #include "study/node_ct.h"
 #include "study/pose_file.h"
 #include "study/rig_file.h"
@@ -130,12 +131,13 @@ MotionRange range_about(const std::vector<RigidTransform>& poses,
 
 FieldSource load_source(const PrecomputeOptions& options, const Communicator& communicator) {
   FieldSource source;
-  const NamedSource named = named_source(options, communicator, source.warnings);
+  std::vector<std::string> warnings;
+  const NamedSource named = named_source(options, communicator, warnings);
   source.camera = all_or_none(communicator, [&] { return named.rig.camera(named.camera); });
   const StudyPlaces places = named.study_case ? named.study_case->places : StudyPlaces();
   const NodeCt ct = naming_study_line(places, "ct", [&] {
     return read_ct_per_node(
-        named.ct_path, named.ct_reading, options.attenuation, communicator, source.warnings);
+        named.ct_path, named.ct_reading, options.attenuation, communicator, warnings);
   });
   if (named.study_case)
     all_or_none(communicator, [&] { require_target_in_ct(*named.study_case, ct.facts.grid); });
@@ -149,20 +151,22 @@ FieldSource load_source(const PrecomputeOptions& options, const Communicator& co
   if (!options.cover.empty()) {
     const std::vector<RigidTransform> poses = shared_poses(communicator, [&] {
       return read_poses(
-          options.cover, {source.frame, "--ct " + shell_quoted(named.ct_path)}, &source.warnings);
+          options.cover, {source.frame, "--ct " + shell_quoted(named.ct_path)}, &warnings);
     });
     source.range = range_about(poses, source.frame, source.range);
     all_or_none(communicator, [&] { throw_if_any(problems(source.range)); });
   }
   if (!options.cover_rig.empty())
-    source.more_cameras = shared_rig(options.cover_rig, communicator, &source.warnings).cameras;
+    source.more_cameras = shared_rig(options.cover_rig, communicator, &warnings).cameras;
   if (!options.projections.empty())
     source.projections = load_measured_views(
         options,
         *source.volume,
         source.frame.nominal_room_from_ct().linear().transpose() * source.camera.beam_direction(),
         communicator,
-        source.warnings);
+        warnings);
+  for (const std::string& warning : warnings) warn(communicator, warning);
+  if (source.projections != nullptr) inform(communicator, source.projections->text());
   return source;
 }
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -9,6 +8,7 @@
 #include "ct/attenuation_volume.h"
 #include "ct/ct_identity.h"
 #include "ct/ct_read_options.h"
+#include "field/attenuation_quantizer.h"
 #include "geometry/camera_geometry.h"
 #include "geometry/rigid_transform.h"
 #include "geometry/slab_sizing.h"
@@ -32,11 +32,14 @@ struct FieldSource {
   std::vector<HalfSpace> sources;            ///< which of its poses to hold: LightSlabSpec::sources
   std::vector<CameraGeometry> more_cameras;  ///< whose rays the field holds, too
   std::shared_ptr<const MeasuredViews> projections;  ///< that correct the field; null: none
-  std::vector<std::string> warnings;
+
+  [[nodiscard]] AttenuationQuantizer quantizer() const {
+    return AttenuationQuantizer::for_maximum(volume->max_total_attenuation());
+  }
 };
 
-/// Collective. Reads what the options name. UsageError when they name too little; InputError and
-/// FileError as the readers.
+/// Collective. Reads what the options name, and tells the terminal of what it met. UsageError when
+/// they name too little; InputError and FileError as the readers.
 FieldSource load_source(const PrecomputeOptions& options, const Communicator& communicator);
 
 }  // namespace af

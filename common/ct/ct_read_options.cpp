@@ -1,23 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ct/ct_read_options.h"
 
-#include <algorithm>
 #include <cmath>
-#include <optional>
 #include <set>
 
 #include "base/joined.h"
 #include "base/number_text.h"
 #include "base/parsed_number.h"
-#include "base/plausible.h"
 
 namespace af {
 
-namespace {
-
-constexpr double kUnlabelledHu = -1000.0;
-
-/// "3=700"; nullopt for anything else.
 std::optional<std::pair<double, double>> label_of(const std::string& text) {
   const std::size_t equals = text.find('=');
   if (equals == std::string::npos) return std::nullopt;
@@ -26,8 +18,6 @@ std::optional<std::pair<double, double>> label_of(const std::string& text) {
   if (!label || !hu || *label != std::round(*label) || std::abs(*hu) > 32767.0) return std::nullopt;
   return std::pair{*label, *hu};
 }
-
-}  // namespace
 
 void CtReadOptions::describe(Fields& field) {
   field("series", series_uid, "DICOM series UID, when the CT's folder has several").input();
@@ -97,36 +87,6 @@ std::string CtReadOptions::text() const {
   if (values == "labels") parts.push_back("labels " + joined(label_hu) + " HU");
   if (keeps_body_only) parts.emplace_back("body only");
   return joined(parts, "; ");
-}
-
-HuConversion::HuConversion(const CtReadOptions& options) {
-  throw_if_any(problems(options));
-  const double per_hu = options.values_water_mu_per_mm / 1000.0;
-  if (options.values == "mu" || options.values == "raw") {
-    const bool is_raw = options.values == "raw";
-    kind_ = Kind::Scaled;
-    scale_ = (is_raw ? options.raw_slope_per_mm : 1.0) / per_hu;
-    offset_ = (is_raw ? options.raw_offset_per_mm / per_hu : 0.0) + kUnlabelledHu;
-  }
-  if (options.values == "labels") {
-    kind_ = Kind::Labels;
-    for (const std::string& text : options.label_hu) labels_.push_back(*label_of(text));
-    std::sort(labels_.begin(), labels_.end());
-  }
-}
-
-double HuConversion::hu(double number) const {
-  switch (kind_) {
-    case Kind::Hu:
-      return number;
-    case Kind::Scaled:
-      return scale_ * number + offset_;
-    case Kind::Labels:
-      break;
-  }
-  if (!std::isfinite(number)) return number;
-  const auto found = std::lower_bound(labels_.begin(), labels_.end(), std::pair{number, -1e300});
-  return found != labels_.end() && found->first == number ? found->second : kUnlabelledHu;
 }
 
 }  // namespace af

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -46,25 +47,10 @@ struct CtReadOptions {
 
 std::vector<std::string> problems(const CtReadOptions& options);
 
+/// Number and HU of a label: "3=700"; nothing for anything else.
+std::optional<std::pair<double, double>> label_of(const std::string& text);
+
 /// The options of a program that takes --ct or --study: a study says itself how its CTs are read.
 void describe_beside_ct(Fields& field, CtReadOptions& options);
-
-/// Numbers of a CT's file as HU.
-class HuConversion {
- public:
-  /// The numbers are HU.
-  HuConversion() = default;
-  /// InputError for options with problems.
-  explicit HuConversion(const CtReadOptions& options);
-  [[nodiscard]] bool is_identity() const { return kind_ == Kind::Hu; }
-  [[nodiscard]] double hu(double number) const;
-
- private:
-  enum class Kind { Hu, Scaled, Labels };
-  Kind kind_ = Kind::Hu;
-  double scale_ = 1.0;
-  double offset_ = 0.0;
-  std::vector<std::pair<double, double>> labels_;  ///< number, HU; by number
-};
 
 }  // namespace af

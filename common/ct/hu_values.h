@@ -15,6 +15,24 @@
 
 namespace af {
 
+/// Numbers of a CT's file as HU.
+class HuConversion {
+ public:
+  /// The numbers are HU.
+  HuConversion() = default;
+  /// InputError for options with problems.
+  explicit HuConversion(const CtReadOptions& options);
+  [[nodiscard]] bool is_identity() const { return kind_ == Kind::Hu; }
+  [[nodiscard]] double hu(double number) const;
+
+ private:
+  enum class Kind { Hu, Scaled, Labels };
+  Kind kind_ = Kind::Hu;
+  double scale_ = 1.0;
+  double offset_ = 0.0;
+  std::vector<std::pair<double, double>> labels_;  ///< number, HU; by number
+};
+
 /// Collects voxels as int16 HU and counts what does not fit.
 class HuValues {
  public:

@@ -9,7 +9,7 @@
 
 #include "ct/ct_volume.h"
 #include "figures/picture.h"
-#include "geometry/slab_sizing.h"
+#include "geometry/ct_box.h"
 
 namespace af {
 

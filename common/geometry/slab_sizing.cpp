@@ -364,15 +364,6 @@ double lowest_source_y_mm(const CameraGeometry& camera,
   return MovingCamera(camera, frame, range, slab_from_ct).lowest_source_y();
 }
 
-std::array<Eigen::Vector3d, 8> CtBox::corner_points() const {
-  std::array<Eigen::Vector3d, 8> corners;
-  for (unsigned i = 0; i < 8; ++i)
-    corners[i] = {(i & 1u) != 0 ? high_mm.x() : low_mm.x(),
-                  (i & 2u) != 0 ? high_mm.y() : low_mm.y(),
-                  (i & 4u) != 0 ? high_mm.z() : low_mm.z()};
-  return corners;
-}
-
 LightSlab make_light_slab(const CameraGeometry& camera,
                           const PoseFrame& frame,
                           const MotionRange& range,

@@ -46,15 +46,6 @@ double lowest_source_y_mm(const CameraGeometry& camera,
                           const MotionRange& range,
                           const RigidTransform& slab_from_ct);
 
-/// An axis-aligned box in the ct frame (mm).
-struct CtBox {
-  Eigen::Vector3d low_mm;
-  Eigen::Vector3d high_mm;
-
-  auto members() { return std::tie(low_mm, high_mm); }
-  [[nodiscard]] std::array<Eigen::Vector3d, 8> corner_points() const;
-};
-
 /// Points x with normal . x <= offset_mm.
 struct HalfSpace {
   Eigen::Vector3d normal = Eigen::Vector3d::UnitX();

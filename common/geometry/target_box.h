@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "geometry/slab_sizing.h"
+#include "geometry/ct_box.h"
 
 namespace af {
 

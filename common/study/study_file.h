@@ -12,8 +12,8 @@
 #include "base/error.h"
 #include "ct/ct_read_options.h"
 #include "geometry/camera_geometry.h"
+#include "geometry/ct_box.h"
 #include "geometry/rigid_transform.h"
-#include "geometry/slab_sizing.h"
 #include "study/xray_reading.h"
 #include "xray/image2d.h"
 

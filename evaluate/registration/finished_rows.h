@@ -8,8 +8,8 @@
 
 #include "evaluate/registration/registration_rows.h"
 #include "evaluate/report/evaluation_run.h"
+#include "geometry/ct_box.h"
 #include "geometry/rigid_transform.h"
-#include "geometry/slab_sizing.h"
 
 namespace af::evaluation {
 

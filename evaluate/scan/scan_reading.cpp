@@ -2,6 +2,7 @@
 #include "evaluate/scan/scan_reading.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "base/error.h"
 #include "base/number_text.h"

@@ -3,7 +3,7 @@
 
 #include "ct/ct_volume.h"
 #include "drr/drr_renderer.h"
-#include "geometry/slab_sizing.h"
+#include "geometry/ct_box.h"
 
 namespace af {
 

@@ -4,8 +4,8 @@
 #include <cstdint>
 
 #include "geometry/camera_geometry.h"
+#include "geometry/ct_box.h"
 #include "geometry/rigid_transform.h"
-#include "geometry/slab_sizing.h"
 
 namespace af {
 

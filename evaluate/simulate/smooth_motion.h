@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "ct/ct_volume.h"
-#include "geometry/slab_sizing.h"
+#include "geometry/ct_box.h"
 
 namespace af {
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "ct/ct_volume.h"
-#include "geometry/slab_sizing.h"
+#include "geometry/ct_box.h"
 
 namespace af {
 

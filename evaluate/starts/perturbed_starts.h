@@ -9,8 +9,9 @@
 #include <vector>
 
 #include "base/shared_array.h"
+#include "geometry/ct_box.h"
+#include "geometry/motion_range.h"
 #include "geometry/rigid_transform.h"
-#include "geometry/slab_sizing.h"
 #include "geometry/tre.h"
 
 namespace af::evaluation {

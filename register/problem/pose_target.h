@@ -8,8 +8,8 @@
 
 #include "ct/ct_volume.h"
 #include "drr/drr_renderer.h"
+#include "geometry/ct_box.h"
 #include "geometry/rigid_transform.h"
-#include "geometry/slab_sizing.h"
 #include "register/optimizer/optimizer.h"
 #include "register/problem/multi_view_objective.h"
 

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "base/hash_random.h"
+#include "geometry/ct_box.h"
 #include "support/c_arm_camera.h"
 
 namespace af::benchmark {

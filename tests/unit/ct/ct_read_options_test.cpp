@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "ct/attenuation_volume.h"
+#include "ct/hu_values.h"
 
 namespace af {
 namespace {

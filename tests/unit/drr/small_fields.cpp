@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/hash_random.h"
+#include "geometry/ct_box.h"
 #include "geometry/slab_sizing.h"
 #include "support/c_arm_camera.h"
 

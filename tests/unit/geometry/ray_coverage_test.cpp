@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "base/hash_random.h"
 #include "geometry/camera_distance.h"
+#include "geometry/ct_box.h"
 #include "geometry/hit_extents.h"
 #include "geometry/motion_range.h"
 #include "geometry/orbit.h"

@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "base/hash_random.h"
+#include "geometry/ct_box.h"
 #include "support/c_arm_camera.h"
 #include "unit/geometry/closed_form_plane_sizes.h"
 

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "base/hash_random.h"
+#include "geometry/ct_box.h"
 #include "geometry/slab_sizing.h"
 #include "support/c_arm_camera.h"
 

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "drr/ray_cast_drr.h"
+#include "geometry/ct_box.h"
 #include "geometry/slab_sizing.h"
 #include "support/c_arm_camera.h"
 #include "support/ct_phantoms.h"

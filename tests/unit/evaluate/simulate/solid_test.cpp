@@ -6,6 +6,7 @@
 #include <numbers>
 #include <vector>
 
+#include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
 #include "base/hash_random.h"

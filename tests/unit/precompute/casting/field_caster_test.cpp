@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "base/vector_width.h"
-#include "geometry/slab_sizing.h"
+#include "geometry/ct_box.h"
 #include "precompute/casting/trilinear_caster.h"
 #include "precompute/casting/unit_costs.h"
 #include "precompute/casting/unit_planner.h"
