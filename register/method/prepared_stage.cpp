@@ -81,7 +81,7 @@ SimilarityReference prepare_reference(const RegistrationView& view,
 SimilarityOptions similarity_of(const StageOptions& stage) {
   SimilarityOptions similarity = stage.similarity;
   similarity.has_smooth_histogram |=
-      make_optimizer(stage.optimizer)->needs() == Derivatives::Gradient;
+      known_optimizer(stage.optimizer).needs() == Derivatives::Gradient;
   return similarity;
 }
 
@@ -140,7 +140,7 @@ PreparedStage prepared_stage(const RegistrationProblem& problem,
       silhouettes.push_back(silhouette_view(problem, view, whole.back(), reference, stage));
   }
   return {stage,
-          make_optimizer(stage.optimizer),
+          &known_optimizer(stage.optimizer),
           MultiViewObjective(std::move(whole), pool),
           std::move(silhouettes)};
 }

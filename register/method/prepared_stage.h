@@ -17,7 +17,7 @@ namespace af::registration {
 /// sees them, its renderers and measures.
 struct PreparedStage {
   StageOptions options;
-  std::shared_ptr<const Optimizer> optimizer;
+  const Optimizer* optimizer;
   MultiViewObjective objective;  ///< narrowed to the silhouettes at the last pose, if any
   std::vector<SilhouetteView> silhouettes;  ///< none where the whole region counts
 

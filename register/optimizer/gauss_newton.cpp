@@ -73,12 +73,19 @@ ScaledMatrix LearnedCurvature::added_to(const ScaledMatrix& matrix) const {
   return kept_between(matrix + missing_, matrix, kLeastShare, kMostShare);
 }
 
-void GaussNewton::maximize(OptimizationTarget& target,
-                           const OptimizerOptions& options,
-                           const SearchBudget& budget,
-                           OptimizerResult& result) const {
+namespace {
+
+/// `learns`: curvature from the steps, too.
+void damped_newton(LeastSquaresTarget& target,
+                   const OptimizerOptions& options,
+                   const SearchBudget& budget,
+                   bool learns,
+                   OptimizerResult& result) {
   SearchRun run(target, budget, result);
-  std::optional<TargetValue> at = run.begin(needs());
+  const SearchRun::WithDerivatives with_equations = [&](const ScaledParameters& point) {
+    return target.evaluate_with_normal_equations(point);
+  };
+  std::optional<TargetValue> at = run.begin(with_equations);
   if (!at) return;
   LearnedCurvature learned;
   double damping = kFirstDamping;
@@ -89,7 +96,8 @@ void GaussNewton::maximize(OptimizationTarget& target,
     const ScaledParameters step = point - result.point;
     // No step follows the last one: it needs no derivatives.
     const bool is_last = step.norm() < options.final_step_mm;
-    const SearchRun::Evaluation next = run.evaluate(point, is_last ? Derivatives::None : needs());
+    const SearchRun::Evaluation next =
+        is_last ? run.evaluate(point) : run.evaluate(point, with_equations);
     if (next.outcome == SearchRun::Outcome::Ended) {
       run.trace(step.norm());
       return;
@@ -97,7 +105,7 @@ void GaussNewton::maximize(OptimizationTarget& target,
     const bool is_inadmissible = next.outcome == SearchRun::Outcome::Inadmissible;
     if (!is_inadmissible && next.target.value > result.value) {
       run.accept(point, next.target.value);
-      if (curvature_ == Curvature::Learned && !is_last) learned.learn(step, *at, next.target);
+      if (learns && !is_last) learned.learn(step, *at, next.target);
       at = next.target;
       damping = std::max(damping / kDampingFactor, kLeastDamping);
       met_limit = false;
@@ -113,6 +121,22 @@ void GaussNewton::maximize(OptimizationTarget& target,
       return;
     }
   }
+}
+
+}  // namespace
+
+void gauss_newton(LeastSquaresTarget& target,
+                  const OptimizerOptions& options,
+                  const SearchBudget& budget,
+                  OptimizerResult& result) {
+  damped_newton(target, options, budget, false, result);
+}
+
+void quasi_newton(LeastSquaresTarget& target,
+                  const OptimizerOptions& options,
+                  const SearchBudget& budget,
+                  OptimizerResult& result) {
+  damped_newton(target, options, budget, true, result);
 }
 
 }  // namespace af::registration

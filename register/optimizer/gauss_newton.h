@@ -36,23 +36,15 @@ class LearnedCurvature {
 /// before limits trim it, is at most half as long, which also turns it; until a step falls below
 /// final_step_mm. \test GaussNewton.EndsAQuadraticInAFewSteps,
 /// GaussNewton.HalvesRejectedStepsAtLeast, QuasiNewton.LearnsMissingCurvature
-class GaussNewton final : public Optimizer {
- public:
-  /// Where the curvature of a step comes from.
-  enum class Curvature {
-    OfTarget,
-    Learned,  ///< and from the steps so far (LearnedCurvature)
-  };
-  explicit GaussNewton(Curvature curvature) : curvature_(curvature) {}
+void gauss_newton(LeastSquaresTarget& target,
+                  const OptimizerOptions& options,
+                  const SearchBudget& budget,
+                  OptimizerResult& result);
 
-  [[nodiscard]] Derivatives needs() const override { return Derivatives::NormalEquations; }
-  void maximize(OptimizationTarget& target,
-                const OptimizerOptions& options,
-                const SearchBudget& budget,
-                OptimizerResult& result) const override;
-
- private:
-  Curvature curvature_;
-};
+/// The same with the curvature that steps teach (LearnedCurvature).
+void quasi_newton(LeastSquaresTarget& target,
+                  const OptimizerOptions& options,
+                  const SearchBudget& budget,
+                  OptimizerResult& result);
 
 }  // namespace af::registration

@@ -21,7 +21,7 @@ constexpr int kTiles = 8;
 /// The stage as the curvature needs it: with derivatives, and with an optimiser that they suit.
 /// Robust gradients are of no use within silhouettes (see PoseExaminer).
 StageOptions differentiable(StageOptions stage) {
-  if (!similarity_has_derivative(stage.similarity.name))
+  if (!known_measure(stage.similarity.name).is_differentiable)
     stage.similarity.name = stage.silhouette_mm > 0.0 ? "gc" : "rg";
   stage.similarity.has_smooth_histogram = true;
   stage.optimizer = "gradient";

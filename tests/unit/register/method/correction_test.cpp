@@ -109,7 +109,7 @@ TEST(Correction, OfAnImageThatStaysEndsBetterByEveryMeasureAndWhereRayCastingDoe
   const test::SmallCase small = spoilt_case();
   for (const std::string& similarity : similarity_names()) {
     SCOPED_TRACE(similarity);
-    const bool has_squares = similarity_has_normal_equations(similarity);
+    const bool has_squares = known_measure(similarity).is_least_squares;
     RegistrationOptions options =
         one_stage(similarity, has_squares ? "gauss-newton" : "best-neighbor");
     const auto [plain, better] = plain_and_better(small, options);
@@ -136,7 +136,7 @@ TEST(Correction, IsOfAnyOptimiserAndTheSearchThatItDoesByRayCasting) {
   for (const std::string& optimizer : optimizer_names()) {
     SCOPED_TRACE(optimizer);
     RegistrationOptions options = one_stage("ncc", optimizer);
-    const bool has_derivatives = make_optimizer(optimizer)->needs() != Derivatives::None;
+    const bool has_derivatives = known_optimizer(optimizer).needs() != Derivatives::None;
     if (!has_derivatives) options.chains.front().stages.front().search.final_step_mm = 0.1;
     options.correction.max_casts = 1000;
     const auto [plain, better] = plain_and_better(small, options);

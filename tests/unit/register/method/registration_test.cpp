@@ -601,7 +601,7 @@ TEST(PoseTarget, DerivativesAreThoseOfItsValue) {
         objective, PoseFrame::about(start_near(small), problem.center_ct_mm), some_scaling());
     ScaledParameters point;
     point << 1.0, -0.7, 0.5, 0.3, -0.2, 0.4;
-    const auto with = target.evaluate_with(point, Derivatives::NormalEquations);
+    const auto with = target.evaluate_with_normal_equations(point);
     ASSERT_TRUE(with.has_value());
     for (int k = 0; k < 6; ++k) {
       // The renderer's own derivatives are differences over 1e-3 rad and 0.1 mm.
@@ -625,7 +625,7 @@ TEST(PoseTarget, BoundsTheCurvatureOfReweightedResidualsByTheirNormalEquations) 
   const ParameterScaling scaling = some_scaling();
   const PoseFrame frame = PoseFrame::about(start_near(small), small.problem->center_ct_mm);
   PoseTarget target(objective, frame, scaling);
-  const auto with = target.evaluate_with(ScaledParameters::Zero(), Derivatives::NormalEquations);
+  const auto with = target.evaluate_with_normal_equations(ScaledParameters::Zero());
   ASSERT_TRUE(with.has_value());
   NormalEquations equations;
   objective.evaluate_with(

@@ -60,7 +60,7 @@ class LinearRenderer final : public DrrRenderer {
 };
 
 /// -|x - d|^2 over the pixels, and its derivative; nothing normalised.
-class PlainSquares final : public SimilarityMeasure {
+class PlainSquares final : public DifferentiableMeasure {
  public:
   explicit PlainSquares(std::vector<float> xray) : xray_(std::move(xray)) {}
 
