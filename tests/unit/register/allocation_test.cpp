@@ -122,11 +122,11 @@ TEST_P(AllocationOf, ARegistrationDoesNotGrowWithItsEvaluations) {
   const test::SmallCase small = test::small_case();
   RegistrationOptions options = preset_options("paper");
   options.use_similarity(GetParam());
-  RegistrationRunner runner(small.problem, options);
-  const RegistrationResult result = runner.run(small.problem->nominal_room_from_ct);
+  Registration registration(small.problem, options);
+  const RegistrationResult result = registration.search(small.problem->nominal_room_from_ct);
   ASSERT_GT(result.evaluations, 100);
   const long allocations =
-      allocations_of([&] { (void)runner.run(small.problem->nominal_room_from_ct); });
+      allocations_of([&] { (void)registration.search(small.problem->nominal_room_from_ct); });
   // A few per stage and a trace that doubles its memory, whatever the number of evaluations.
   constexpr long kMostAllocations = 40;
   EXPECT_LE(allocations, kMostAllocations) << result.evaluations << " evaluations";
