@@ -15,7 +15,7 @@
 #include "register/case_loading.h"
 #include "register/method/method_options.h"
 #include "register/method/presets.h"
-#include "register/verdict/registrar.h"
+#include "register/verdict/registration.h"
 #include "study/case_gold_standard.h"
 #include "study/landmark_start.h"
 #include "study/study_file.h"
@@ -115,8 +115,8 @@ struct RegistrationCase::Impl {
   std::optional<af::GoldStandard> gold;
   std::vector<Eigen::Vector3d> target_points;
   std::shared_ptr<const registration::RegistrationProblem> problem;
-  std::unique_ptr<registration::Registrar> registrar;
-  af::ForkAwareMutex mutex;  ///< of registrar
+  std::optional<registration::Registration> registration;
+  af::ForkAwareMutex mutex;  ///< of registration
 
   [[nodiscard]] std::optional<double> tre_mm(const af::RigidTransform& pose) const {
     if (!gold.has_value()) return std::nullopt;
@@ -125,7 +125,7 @@ struct RegistrationCase::Impl {
 
   /// `is_diagnosed`: X-rays that do not fit are looked into, as af-register does for its best end.
   Registration run(const af::RigidTransform& start, std::int64_t start_index, bool is_diagnosed) {
-    registration::RegistrationRecord record = registrar->run(start, start_index);
+    registration::RegistrationRecord record = registration->run(start, start_index);
     if (is_diagnosed) registration::diagnose(problem, record);
     const registration::RegistrationResult& result = record.result;
     const auto judgement = registration::judgement_of(record);
@@ -190,11 +190,8 @@ RegistrationCase RegistrationCase::load(const std::filesystem::path& study_path,
         registration::load_case(study, study_case, loading, af::Communicator::alone());
     impl->warnings.insert(impl->warnings.end(), loaded.warnings.begin(), loaded.warnings.end());
     impl->problem = loaded.problem;
-    impl->registrar = std::make_unique<registration::Registrar>(
-        loaded.problem,
-        registration::RegistrationRunner(loaded.problem, method, pool),
-        uncertainty_options(options),
-        pool);
+    impl->registration.emplace(loaded.problem, method, pool);
+    impl->registration->examine_ends(uncertainty_options(options), pool);
     return RegistrationCase(std::move(impl));
   });
 }
@@ -270,8 +267,7 @@ std::optional<double> RegistrationCase::similarity(const Pose& pose) const {
   return library::translated([&]() -> std::optional<double> {
     const af::RigidTransform room_from_ct = library::transform_of(pose, "pose");
     const std::lock_guard turn(impl_->mutex);
-    const registration::ObjectiveValue value =
-        impl_->registrar->runner().similarity_at(room_from_ct);
+    const registration::ObjectiveValue value = impl_->registration->similarity_at(room_from_ct);
     return value.is_admissible ? std::optional(value.similarity) : std::nullopt;
   });
 }

@@ -13,7 +13,7 @@
 #include "drr/xray_beam.h"
 #include "ranks/communicator.h"
 #include "ranks/input_identity.h"
-#include "register/method/registration.h"
+#include "register/problem/registration_problem.h"
 #include "study/study_file.h"
 
 namespace af::registration {
@@ -24,6 +24,10 @@ enum class RendererKind { Field, RayCast };
 
 /// "field" or "raycast".
 const char* to_string(RendererKind kind);
+
+/// The problem with a correction where rays are cast anyway.
+inline constexpr const char* kCorrectsRayCasting =
+    "--correct = set: must not be given with --renderer raycast, whose DRRs are ray-cast already";
 
 struct CaseLoadOptions {
   RendererKind renderer = RendererKind::Field;

@@ -11,7 +11,6 @@
 #include "register/case_loading.h"
 #include "register/field_paths.h"
 #include "register/method/method_options.h"
-#include "register/method/registration.h"
 #include "register/verdict/uncertainty_estimator.h"
 
 namespace af::registration {

@@ -226,8 +226,10 @@ void run_registration(const RegisterOptions& options,
   const auto pool = std::make_shared<ThreadPool>(thread_count(options.method.threads));
   const LoadedCase loaded = load_problem(options, method, registered, pool, world);
   const auto& problem = loaded.problem;
-  Registrar registrar = all_or_none(world, [&] {
-    return Registrar(problem, RegistrationRunner(problem, method, pool), options.uncertainty, pool);
+  Registration registration = all_or_none(world, [&] {
+    Registration made(problem, method, pool);
+    made.examine_ends(options.uncertainty, pool);
+    return made;
   });
   do_on_root(world, [&] {
     announce_outputs(options.output_folder, overlay_file_names(*problem));
@@ -240,7 +242,7 @@ void run_registration(const RegisterOptions& options,
   const RunDescription description =
       description_of(in_force, registered, loaded, command_line, world);
   std::vector<RegistrationRecord> records = register_starts(
-      registrar,
+      registration,
       registered.starts,
       folder.unfinished("registrations",
                         deciding_values(deciding_options(in_force), description.provenance.inputs)),
@@ -250,12 +252,12 @@ void run_registration(const RegisterOptions& options,
   });
 }
 
-std::vector<RegistrationRecord> register_starts(Registrar& registrar,
+std::vector<RegistrationRecord> register_starts(Registration& registration,
                                                 std::span<const RigidTransform> starts,
                                                 const UnfinishedWork& unfinished,
                                                 const Communicator& communicator) {
   const auto run = [&](std::int64_t index) {
-    return registrar.run(starts[static_cast<std::size_t>(index)], index);
+    return registration.run(starts[static_cast<std::size_t>(index)], index);
   };
   std::vector<RegistrationRecord> records;
   if (starts.empty()) return records;

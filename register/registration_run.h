@@ -9,7 +9,7 @@
 #include "ranks/communicator.h"
 #include "ranks/resumable_items.h"
 #include "register/register_options.h"
-#include "register/verdict/registrar.h"
+#include "register/verdict/registration.h"
 #include "study/pose_format.h"
 
 namespace af::registration {
@@ -33,7 +33,7 @@ void run_registration(const RegisterOptions& options,
 /// killed run can resume. Rank 0 returns one record per start, in the order of starts; the others
 /// return none. Only the record of the highest similarity (ties: the lowest start index) keeps its
 /// trace, so that memory does not grow with the number of starts.
-std::vector<RegistrationRecord> register_starts(Registrar& registrar,
+std::vector<RegistrationRecord> register_starts(Registration& registration,
                                                 std::span<const RigidTransform> starts,
                                                 const UnfinishedWork& unfinished,
                                                 const Communicator& communicator);

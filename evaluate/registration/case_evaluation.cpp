@@ -45,12 +45,12 @@ using registration::RegistrationRecord;
 /// One renderer's share of a case.
 struct Method {
   std::string renderer;
-  registration::Registrar registrar;
+  registration::Registration registration;
   std::vector<std::int64_t> start_indices;  ///< ascending
   double success_tre_mm = kSuccessTreMm;    ///< failures keep their traces
 
   [[nodiscard]] const registration::RegistrationProblem& problem() const {
-    return registrar.runner().problem();
+    return *registration.problem;
   }
 };
 
@@ -89,7 +89,7 @@ StratifiedStarts make_starts(const RegistrationStudyOptions& options,
       motion_limit(methods));
   if (!options.starts_from.empty())
     return given_starts(options, study, study_case, yardstick, measures, notes);
-  if (options.start_rule == "within-range") return starts_within_range(measures);
+  if (options.start_rule == "within-range") return starts_within_range(measures, "--start-rule");
   return options.start_rule == "uniform" ? uniform_starts(measures) : stratified_starts(measures);
 }
 
@@ -158,7 +158,7 @@ TracedRow traced_row(Method& method,
   RegistrationRow& row = traced.row;
   row = registered_row(
       [&](const RigidTransform& room_from_ct) {
-        RegistrationRecord record = method.registrar.run(room_from_ct, index);
+        RegistrationRecord record = method.registration.run(room_from_ct, index);
         trace = std::move(record.result.trace);
         return record;
       },
@@ -249,9 +249,8 @@ void announce_times(std::vector<Method>& methods,
                       poses_tried = static_cast<double>(row.evaluations);
                       return 1.0;
                     }
-                    registration::RegistrationRunner& runner = method.registrar.runner();
-                    std::ignore = runner.similarity_at(start.room_from_ct);
-                    return poses_tried.value_or(usual_poses(runner.options()));
+                    std::ignore = method.registration.similarity_at(start.room_from_ct);
+                    return poses_tried.value_or(usual_poses(method.registration.method));
                   });
   }
 }
@@ -515,14 +514,9 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
                     uncertainty.is_left_out ? 0 : PoseExaminer::coarsest_level(),
                     kept_fields)) {
     all_or_none(world, [&] {
-      methods.push_back({method.renderer,
-                         registration::Registrar(method.problem,
-                                                 std::move(method.runner),
-                                                 uncertainty,
-                                                 nullptr,
-                                                 !uncertainty.is_left_out),
-                         {},
-                         options.success_tre_mm});
+      if (!uncertainty.is_left_out) method.registration.examine_ends(uncertainty);
+      methods.push_back(
+          {method.renderer, std::move(method.registration), {}, options.success_tre_mm});
     });
   }
   const Yardstick yardstick = all_or_none(world, [&] {

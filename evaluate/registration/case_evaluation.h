@@ -16,7 +16,7 @@
 #include "evaluate/starts/perturbed_starts.h"
 #include "ranks/communicator.h"
 #include "ranks/run_folder.h"
-#include "register/verdict/registrar.h"
+#include "register/verdict/registration.h"
 #include "study/case_gold_standard.h"
 #include "study/study_file.h"
 

@@ -34,6 +34,7 @@
 #include "ranks/run_folder.h"
 #include "ranks/terminal.h"
 #include "ranks/work_watch.h"
+#include "register/case_loading.h"
 #include "study/pose_file.h"
 #include "study/shared_inputs.h"
 

@@ -11,7 +11,7 @@
 #include "evaluate/registration/registration_rows.h"
 #include "evaluate/registration/yardstick.h"
 #include "files/csv_table.h"
-#include "register/method/registration.h"
+#include "register/method/registration_result.h"
 
 namespace af::evaluation {
 

@@ -79,9 +79,9 @@ std::vector<LoadedMethod> load_methods(
       inputs.identities[study_case.name + ": " + name] = hash;
     for (const auto& [name, note] : loaded.input_notes)
       inputs.notes[study_case.name + ": " + name] = note;
-    registration::RegistrationRunner runner = all_or_none(
-        world, [&] { return registration::RegistrationRunner(loaded.problem, its_method, pool); });
-    methods.push_back({renderer, std::move(runner), loaded.problem});
+    all_or_none(world, [&] {
+      methods.push_back({renderer, registration::Registration(loaded.problem, its_method, pool)});
+    });
   }
   return methods;
 }

@@ -10,15 +10,14 @@
 #include "ranks/communicator.h"
 #include "ranks/input_identity.h"
 #include "register/kept_fields.h"
-#include "register/method/registration.h"
+#include "register/verdict/registration.h"
 
 namespace af::evaluation {
 
 /// One renderer with everything that is needed to register a case with it.
 struct LoadedMethod {
   std::string renderer;  ///< "field" or "raycast"
-  registration::RegistrationRunner runner;
-  std::shared_ptr<const registration::RegistrationProblem> problem;  ///< the runner's
+  registration::Registration registration;
 };
 
 /// What a case was loaded from, as "CASE: what"; rank 0.

@@ -418,13 +418,12 @@ StratifiedStarts uniform_starts(StartMeasures& measures) {
       [&](const IndexRange& part) { return measures.draw_uniform(part); });
 }
 
-StratifiedStarts starts_within_range(StartMeasures& measures) {
+StratifiedStarts starts_within_range(StartMeasures& measures, const std::string& field) {
   if (!measures.limit().has_value())
-    throw InputError(
-        "--start-rule", "within-range", "needs fields: ray casting alone has no motion range");
+    throw InputError(field, "within-range", "needs fields: ray casting alone has no motion range");
   const StartLimit& limit = *measures.limit();
   if (!limit.range.contains(parameters_from_pose(limit.frame, measures.frame().gold_room_from_ct)))
-    throw InputError("--start-rule",
+    throw InputError(field,
                      "within-range",
                      "the gold pose itself lies outside the fields' motion range",
                      measures.frame().case_name);

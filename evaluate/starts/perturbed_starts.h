@@ -182,8 +182,10 @@ StratifiedStarts uniform_starts(StartMeasures& measures);
 /// the range allows, and translation provides the rest. A direction that cannot reach the TRE
 /// within the range is drawn again and counts as refused, as does one that the predicate refuses
 /// (another field's range). InputError without a limit, for a gold pose outside, and after 1000
-/// refusals of one start. \test PerturbedStarts.WithinRangeLieInsideByDesign
-StratifiedStarts starts_within_range(StartMeasures& measures);
+/// refusals of one start; `field` names the rule there. \test
+/// PerturbedStarts.WithinRangeLieInsideByDesign
+StratifiedStarts starts_within_range(StartMeasures& measures,
+                                     const std::string& field = "start_rule");
 
 /// The starts at given poses, in their order; intervals may lie beyond the last one.
 StratifiedStarts starts_at(StartMeasures& measures, std::span<const RigidTransform> poses);

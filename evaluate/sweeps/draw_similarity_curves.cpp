@@ -77,7 +77,7 @@ void measure_curves(std::vector<LoadedMethod>& methods,
     announce_time(
         world, method.renderer + " similarities", static_cast<std::int64_t>(items.size()), [&] {
           std::ignore =
-              method.runner.similarity_at(pose_from_parameters(gold_frame, PoseParameters()));
+              method.registration.similarity_at(pose_from_parameters(gold_frame, PoseParameters()));
           return 1.0;
         });
     const std::vector<double> similarities = collected_rows<double>(
@@ -89,7 +89,7 @@ void measure_curves(std::vector<LoadedMethod>& methods,
           const auto [c, i] = items[static_cast<std::size_t>(item)];
           const RigidTransform pose =
               pose_from_parameters(gold_frame, along_axis(curves[c].axis, curves[c].offsets[i]));
-          const registration::ObjectiveValue value = method.runner.similarity_at(pose);
+          const registration::ObjectiveValue value = method.registration.similarity_at(pose);
           return value.is_admissible ? value.similarity : std::numeric_limits<double>::quiet_NaN();
         });
     for (std::size_t k = 0; k < items.size(); ++k)
@@ -284,7 +284,7 @@ void run_similarity_curves(const SimilarityCurvesOptions& options,
     json summary = summary_of_kind("similarity-curves");
     summary["case"] = study_case.name;
     summary["gold"] = to_json(gold);
-    summary["similarity"] = methods.front().runner.options().final_similarity();
+    summary["similarity"] = methods.front().registration.method.final_similarity();
     summary["rms_radius_mm"] = radius_mm;
     summary["figures"] = {"similarity-curves"};
     summary["renderers"] = json::array();

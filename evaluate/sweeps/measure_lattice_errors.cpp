@@ -96,11 +96,12 @@ std::vector<LatticeEnds> measured_ends(const std::vector<LoadedMethod>& methods,
     const RigidTransform start =
         pose_from_parameters(frame, PoseParameters::from_deg_and_mm(kStartDegAndMm));
     for (std::size_t i = 0; i < ends.size(); ++i) {
-      registration::RegistrationRunner runner(
-          with_ideal_xrays(methods[i].runner.problem(), methods.back().runner.problem(), truth),
-          methods[i].runner.options(),
+      const registration::Registration& loaded = methods[i].registration;
+      registration::Registration ideal(
+          with_ideal_xrays(*loaded.problem, *methods.back().registration.problem, truth),
+          loaded.method,
           pool);
-      const registration::RegistrationResult result = runner.run(start);
+      const registration::RegistrationResult result = ideal.search(start);
       if (result.stop_reason == registration::StopReason::StepBelowFinal) {
         ends[i].errors.push_back(parameters_from_pose(frame, result.room_from_ct).deg_and_mm());
         ends[i].distance_mm.push_back(mean_tre_mm(result.room_from_ct, truth, points));

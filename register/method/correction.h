@@ -39,8 +39,4 @@ struct CorrectionOptions {
   void describe(Fields& field);
 };
 
-/// The problem with a correction where rays are cast anyway.
-inline constexpr const char* kCorrectsRayCasting =
-    "--correct = set: must not be given with --renderer raycast, whose DRRs are ray-cast already";
-
 }  // namespace af::registration

@@ -13,11 +13,32 @@
 
 namespace af::registration {
 
+/// How a stage of a registration sees a detector.
+struct StageGrid {
+  int pixel_step = 1;      ///< a stage pixel is the mean of pixel_step x pixel_step detector pixels
+  double roi_scale = 1.0;  ///< the region's sides over those of the view's, about its centre
+  double blur_sigma_px = 0.0;  ///< of the X-ray, in detector pixels, the mean's own blur included
+};
+
+/// The view of a stage: the region, scaled about its centre and cut at the detector's edges, seen
+/// by pixels of pixel_step detector pixels (View::coarser). It never reaches beyond the detector,
+/// so a field made for the detector holds every ray.
+View stage_view(const View& view, const StageGrid& grid);
+
+/// The X-ray of a whole detector as the DRRs of stage_view(view, grid) see it: block means, blurred
+/// in all by blur_sigma_px, cropped to the region last, so that its edge pixels know their
+/// surroundings. A stage pixel is used when its whole block is (`mask`: whole detector, non-zero =
+/// used; empty: all). drr_range is left at its default.
+SimilarityReference stage_reference(const Image2d& xray,
+                                    const Image2d& mask,
+                                    const View& view,
+                                    const StageGrid& grid);
+
 /// A stage of a chain with all that does not depend on where it starts: X-rays and regions as it
 /// sees them, its renderers and measures.
 struct PreparedStage {
   StageOptions options;
-  std::shared_ptr<const Optimizer> optimizer;
+  const Optimizer* optimizer;
   MultiViewObjective objective;  ///< narrowed to the silhouettes at the last pose, if any
   std::vector<SilhouetteView> silhouettes;  ///< none where the whole region counts
 
@@ -25,17 +46,19 @@ struct PreparedStage {
   /// too little of them is visible.
   [[nodiscard]] bool narrow_to(const RegistrationProblem& problem,
                                const RigidTransform& room_from_ct);
+  /// The objective's value at a pose, within the silhouettes there; inadmissible when too little of
+  /// them is visible.
+  [[nodiscard]] ObjectiveValue value_at(const RegistrationProblem& problem,
+                                        const RigidTransform& room_from_ct);
 };
 
-/// Smallest and largest value of each view's DRR at the nominal pose, over the region grown by half
-/// its size to every side. InputError when the fields do not hold that pose.
-std::vector<ValueRange> drr_ranges_at_nominal(const RegistrationProblem& problem);
-
-/// `drr_ranges`: of the views. InputError when an X-ray has nothing that could be compared.
-PreparedStage prepared_stage(const RegistrationProblem& problem,
-                             const StageOptions& stage,
-                             std::span<const ValueRange> drr_ranges,
-                             const std::shared_ptr<ThreadPool>& pool);
+/// The stages of a method. InputError when the problem has problems or lacks their levels, when an
+/// X-ray has nothing that could be compared, and when the fields do not hold the nominal pose: each
+/// view's range of DRR values is that of its DRR there, over the region grown by half its size to
+/// every side.
+std::vector<PreparedStage> prepared_stages(const RegistrationProblem& problem,
+                                           std::span<const StageOptions> stages,
+                                           const std::shared_ptr<ThreadPool>& threads);
 
 /// The view's ray casting at a level; none where the problem has none.
 std::shared_ptr<const DrrRenderer> ray_cast_of(const RegistrationView& view, int level);

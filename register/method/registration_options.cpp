@@ -36,17 +36,15 @@ void append_optimizer_problems(const StageOptions& stage, std::vector<std::strin
     found.push_back("optimizer = '" + stage.optimizer + "': must be one of " + joined(names));
     return;
   }
-  const Derivatives needs = make_optimizer(stage.optimizer)->needs();
-  const bool is_served =
-      needs == Derivatives::None ||
-      (needs == Derivatives::Gradient ? similarity_has_derivative(stage.similarity.name)
-                                      : similarity_has_normal_equations(stage.similarity.name));
-  if (is_served) return;
+  const Derivatives needs = known_optimizer(stage.optimizer).needs();
+  const auto serves = [&](const KnownMeasure& measure) {
+    return needs == Derivatives::None ||
+           (needs == Derivatives::Gradient ? measure.is_differentiable : measure.is_least_squares);
+  };
+  if (serves(known_measure(stage.similarity.name))) return;
   std::vector<std::string> fitting;
-  for (const std::string& name : similarity_names())
-    if (needs == Derivatives::Gradient ? similarity_has_derivative(name)
-                                       : similarity_has_normal_equations(name))
-      fitting.push_back(name);
+  for (const KnownMeasure& measure : known_measures())
+    if (serves(measure)) fitting.emplace_back(measure.name);
   found.push_back("similarity = '" + stage.similarity.name + "': optimizer '" + stage.optimizer +
                   "' needs derivatives, which these have: " + joined(fitting));
 }

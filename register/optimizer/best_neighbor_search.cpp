@@ -39,12 +39,12 @@ Neighborhood examine(SearchRun& run, double step_mm) {
 
 }  // namespace
 
-void BestNeighborSearch::maximize(OptimizationTarget& target,
-                                  const OptimizerOptions& options,
-                                  const SearchBudget& budget,
-                                  OptimizerResult& result) const {
+void best_neighbor_search(OptimizationTarget& target,
+                          const OptimizerOptions& options,
+                          const SearchBudget& budget,
+                          OptimizerResult& result) {
   SearchRun run(target, budget, result);
-  if (!run.begin(Derivatives::None)) return;
+  if (!run.begin()) return;
   double step_mm = options.initial_step_mm;
   for (;;) {
     const Neighborhood found = examine(run, step_mm);

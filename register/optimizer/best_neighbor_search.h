@@ -10,12 +10,9 @@ namespace af::registration {
 /// to the first in that order; otherwise halve the step, the last step being final_step_mm exactly.
 /// Inadmissible neighbours are passed over. \test
 /// BestNeighborSearch.FindsAQuadraticsMaximumToTheFinalStep
-class BestNeighborSearch final : public Optimizer {
- public:
-  void maximize(OptimizationTarget& target,
-                const OptimizerOptions& options,
-                const SearchBudget& budget,
-                OptimizerResult& result) const override;
-};
+void best_neighbor_search(OptimizationTarget& target,
+                          const OptimizerOptions& options,
+                          const SearchBudget& budget,
+                          OptimizerResult& result);
 
 }  // namespace af::registration

@@ -107,12 +107,12 @@ void adapt(const Constants& constants,
 
 }  // namespace
 
-void CmaEs::maximize(OptimizationTarget& target,
-                     const OptimizerOptions& options,
-                     const SearchBudget& budget,
-                     OptimizerResult& result) const {
+void cma_es(OptimizationTarget& target,
+            const OptimizerOptions& options,
+            const SearchBudget& budget,
+            OptimizerResult& result) {
   SearchRun run(target, budget, result);
-  if (!run.begin(Derivatives::None)) return;
+  if (!run.begin()) return;
   const Constants constants = constants_of(options.population);
   HashRandom random(budget.random_key);
   Distribution distribution;

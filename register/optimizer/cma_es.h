@@ -10,12 +10,9 @@ namespace af::registration {
 /// initial_step_mm; the search has converged when the largest one falls below final_step_mm. An
 /// inadmissible point ranks last. Random numbers are counted, keyed by budget.random_key: the same
 /// key gives the same search. \test CmaEs.FindsTheHighestOfManyPeaks
-class CmaEs final : public Optimizer {
- public:
-  void maximize(OptimizationTarget& target,
-                const OptimizerOptions& options,
-                const SearchBudget& budget,
-                OptimizerResult& result) const override;
-};
+void cma_es(OptimizationTarget& target,
+            const OptimizerOptions& options,
+            const SearchBudget& budget,
+            OptimizerResult& result);
 
 }  // namespace af::registration

@@ -28,29 +28,29 @@ constexpr double kDampingFactor = 10.0;
 /// damped as if its curvature were this share of the largest one, so that its steps stay finite.
 constexpr double kLeastCurvatureShare = 1e-6;
 
-ScaledParameters damped_step(const TargetValue& at,
-                             const LearnedCurvature& learned,
-                             double damping,
-                             double longest_mm) {
-  const double least = kLeastCurvatureShare * at.matrix.diagonal().maxCoeff();
-  ScaledMatrix matrix = at.matrix;
-  matrix.diagonal() += damping * at.matrix.diagonal().cwiseMax(least);
-  ScaledParameters step = learned.added_to(matrix).ldlt().solve(at.gradient);
-  if (!step.allFinite()) step = at.gradient;
-  const double length = step.norm();
-  return length > longest_mm ? ScaledParameters(step * (longest_mm / length)) : step;
-}
+/// The curvature that normal equations leave out, learned from accepted steps.
+///
+/// DRRs are not linear in the pose, so that where residuals are large the target curves otherwise
+/// than its matrix says, and steps by this alone converge only linearly. The difference follows
+/// from the gradients on either side of a step, by symmetric rank-one updates: a structured
+/// quasi-Newton method (Dennis, Gay and Welsch, An Adaptive Nonlinear Least-Squares Algorithm, ACM
+/// TOMS 7(3), 1981; Nocedal and Wright, Numerical Optimization, 2006, eq. (6.24)).
+class LearnedCurvature {
+ public:
+  [[nodiscard]] bool is_empty() const { return is_empty_; }
+  void clear();
 
-/// Damping after a rejected step, without what was learned: raised until a step is at most half as
-/// long. Small dampings hardly change a step, so that it would be evaluated and rejected again.
-double raised_damping(const TargetValue& at, double damping, double rejected_mm) {
-  do damping *= kDampingFactor;
-  while (damping < kMostDamping &&
-         damped_step(at, LearnedCurvature(), damping, rejected_mm).norm() > rejected_mm / 2.0);
-  return damping;
-}
+  /// Learns from a step between two points with gradients and normal equations.
+  void learn(const ScaledParameters& step, const TargetValue& before, const TargetValue& after);
 
-}  // namespace
+  /// The normal equations `matrix` (positive definite) with what was learned. Along every direction
+  /// the curvature stays within 1/3 and 3 of the matrix's: a step is at most three times as long.
+  [[nodiscard]] ScaledMatrix added_to(const ScaledMatrix& matrix) const;
+
+ private:
+  ScaledMatrix missing_ = ScaledMatrix::Zero();
+  bool is_empty_ = true;
+};
 
 void LearnedCurvature::clear() {
   missing_.setZero();
@@ -73,12 +73,39 @@ ScaledMatrix LearnedCurvature::added_to(const ScaledMatrix& matrix) const {
   return kept_between(matrix + missing_, matrix, kLeastShare, kMostShare);
 }
 
-void GaussNewton::maximize(OptimizationTarget& target,
-                           const OptimizerOptions& options,
-                           const SearchBudget& budget,
-                           OptimizerResult& result) const {
+ScaledParameters damped_step(const TargetValue& at,
+                             const LearnedCurvature& learned,
+                             double damping,
+                             double longest_mm) {
+  const double least = kLeastCurvatureShare * at.matrix.diagonal().maxCoeff();
+  ScaledMatrix matrix = at.matrix;
+  matrix.diagonal() += damping * at.matrix.diagonal().cwiseMax(least);
+  ScaledParameters step = learned.added_to(matrix).ldlt().solve(at.gradient);
+  if (!step.allFinite()) step = at.gradient;
+  const double length = step.norm();
+  return length > longest_mm ? ScaledParameters(step * (longest_mm / length)) : step;
+}
+
+/// Damping after a rejected step, without what was learned: raised until a step is at most half as
+/// long. Small dampings hardly change a step, so that it would be evaluated and rejected again.
+double raised_damping(const TargetValue& at, double damping, double rejected_mm) {
+  do damping *= kDampingFactor;
+  while (damping < kMostDamping &&
+         damped_step(at, LearnedCurvature(), damping, rejected_mm).norm() > rejected_mm / 2.0);
+  return damping;
+}
+
+/// `learns`: curvature from the steps, too.
+void damped_newton(LeastSquaresTarget& target,
+                   const OptimizerOptions& options,
+                   const SearchBudget& budget,
+                   bool learns,
+                   OptimizerResult& result) {
   SearchRun run(target, budget, result);
-  std::optional<TargetValue> at = run.begin(needs());
+  const SearchRun::WithDerivatives with_equations = [&](const ScaledParameters& point) {
+    return target.evaluate_with_normal_equations(point);
+  };
+  std::optional<TargetValue> at = run.begin(with_equations);
   if (!at) return;
   LearnedCurvature learned;
   double damping = kFirstDamping;
@@ -89,7 +116,8 @@ void GaussNewton::maximize(OptimizationTarget& target,
     const ScaledParameters step = point - result.point;
     // No step follows the last one: it needs no derivatives.
     const bool is_last = step.norm() < options.final_step_mm;
-    const SearchRun::Evaluation next = run.evaluate(point, is_last ? Derivatives::None : needs());
+    const SearchRun::Evaluation next =
+        is_last ? run.evaluate(point) : run.evaluate(point, with_equations);
     if (next.outcome == SearchRun::Outcome::Ended) {
       run.trace(step.norm());
       return;
@@ -97,7 +125,7 @@ void GaussNewton::maximize(OptimizationTarget& target,
     const bool is_inadmissible = next.outcome == SearchRun::Outcome::Inadmissible;
     if (!is_inadmissible && next.target.value > result.value) {
       run.accept(point, next.target.value);
-      if (curvature_ == Curvature::Learned && !is_last) learned.learn(step, *at, next.target);
+      if (learns && !is_last) learned.learn(step, *at, next.target);
       at = next.target;
       damping = std::max(damping / kDampingFactor, kLeastDamping);
       met_limit = false;
@@ -113,6 +141,22 @@ void GaussNewton::maximize(OptimizationTarget& target,
       return;
     }
   }
+}
+
+}  // namespace
+
+void gauss_newton(LeastSquaresTarget& target,
+                  const OptimizerOptions& options,
+                  const SearchBudget& budget,
+                  OptimizerResult& result) {
+  damped_newton(target, options, budget, false, result);
+}
+
+void quasi_newton(LeastSquaresTarget& target,
+                  const OptimizerOptions& options,
+                  const SearchBudget& budget,
+                  OptimizerResult& result) {
+  damped_newton(target, options, budget, true, result);
 }
 
 }  // namespace af::registration

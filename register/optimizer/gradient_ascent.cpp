@@ -64,12 +64,15 @@ void remember(const ScaledParameters& step,
 
 }  // namespace
 
-void GradientAscent::maximize(OptimizationTarget& target,
-                              const OptimizerOptions& options,
-                              const SearchBudget& budget,
-                              OptimizerResult& result) const {
+void gradient_ascent(DifferentiableTarget& target,
+                     const OptimizerOptions& options,
+                     const SearchBudget& budget,
+                     OptimizerResult& result) {
   SearchRun run(target, budget, result);
-  std::optional<TargetValue> at = run.begin(needs());
+  const SearchRun::WithDerivatives with_gradient = [&](const ScaledParameters& point) {
+    return target.evaluate_with_gradient(point);
+  };
+  std::optional<TargetValue> at = run.begin(with_gradient);
   if (!at) return;
   std::deque<Change> changes;
   bool met_limit = false;
@@ -78,7 +81,7 @@ void GradientAscent::maximize(OptimizationTarget& target,
     const double length = step.norm();
     const ScaledParameters point = run.stepped(step);
     const ScaledParameters moved = point - result.point;
-    const SearchRun::Evaluation next = run.evaluate(point, needs());
+    const SearchRun::Evaluation next = run.evaluate(point, with_gradient);
     if (next.outcome == SearchRun::Outcome::Ended) {
       run.trace(length);
       return;

@@ -10,13 +10,9 @@ namespace af::registration {
 /// are no longer than initial_step_mm, halved until the value rises enough and the point is
 /// admissible, and the search has converged when they fall below final_step_mm.
 /// \test GradientAscent.FindsAnIllConditionedMaximum
-class GradientAscent final : public Optimizer {
- public:
-  [[nodiscard]] Derivatives needs() const override { return Derivatives::Gradient; }
-  void maximize(OptimizationTarget& target,
-                const OptimizerOptions& options,
-                const SearchBudget& budget,
-                OptimizerResult& result) const override;
-};
+void gradient_ascent(DifferentiableTarget& target,
+                     const OptimizerOptions& options,
+                     const SearchBudget& budget,
+                     OptimizerResult& result);
 
 }  // namespace af::registration

@@ -23,6 +23,13 @@ constexpr double kLeastCurvatureOverLargest = 1e-6;
 /// values more than the pose does, and the derivatives are more reliable.
 constexpr double kValueNoise = 1e-4;
 
+SearchRun::WithDerivatives evaluator(LeastSquaresTarget& target, Derivatives derivatives) {
+  return [&target, derivatives](const ScaledParameters& point) {
+    return derivatives == Derivatives::Gradient ? target.evaluate_with_gradient(point)
+                                                : target.evaluate_with_normal_equations(point);
+  };
+}
+
 ScaledMatrix bent_downwards(const ScaledMatrix& curvature, const ScaledMatrix& gauss_newton) {
   if (gauss_newton.llt().info() == Eigen::Success)
     return kept_between(curvature, gauss_newton, kLeastShareOfGaussNewton, 1.0);
@@ -56,32 +63,33 @@ void correct_curvature(const ScaledParameters& step,
 
 }  // namespace
 
-ScaledMatrix measured_curvature(OptimizationTarget& target,
+ScaledMatrix measured_curvature(LeastSquaresTarget& target,
                                 Derivatives derivatives,
                                 double step_mm) {
   ScaledMatrix curvature = ScaledMatrix::Zero();
-  const std::optional<TargetValue> here =
-      target.evaluate_with(ScaledParameters::Zero(), derivatives);
+  const SearchRun::WithDerivatives with = evaluator(target, derivatives);
+  const std::optional<TargetValue> here = with(ScaledParameters::Zero());
   for (int k = 0; k < 6; ++k) {
     const ScaledParameters step = step_mm * ScaledParameters::Unit(k);
     const ScaledParameters ahead = target.nearest_admissible(step);
     const ScaledParameters behind = target.nearest_admissible(-step);
     const double way = ahead[k] - behind[k];
-    const std::optional<TargetValue> there = target.evaluate_with(ahead, derivatives);
-    const std::optional<TargetValue> back = target.evaluate_with(behind, derivatives);
+    const std::optional<TargetValue> there = with(ahead);
+    const std::optional<TargetValue> back = with(behind);
     if (there && back && way > 0.0) curvature.col(k) = (back->gradient - there->gradient) / way;
   }
   return bent_downwards(0.5 * (curvature + curvature.transpose()),
                         here ? here->matrix : ScaledMatrix::Zero());
 }
 
-void newton_search(OptimizationTarget& target,
+void newton_search(LeastSquaresTarget& target,
                    ScaledMatrix curvature,
                    const NewtonOptions& options,
                    const SearchBudget& budget,
                    OptimizerResult& result) {
   SearchRun run(target, budget, result);
-  std::optional<TargetValue> at = run.begin(options.derivatives);
+  const SearchRun::WithDerivatives with = evaluator(target, options.derivatives);
+  std::optional<TargetValue> at = run.begin(with);
   if (!at) return;
   double longest_mm = options.longest_step_mm;
   for (;;) {
@@ -97,7 +105,7 @@ void newton_search(OptimizationTarget& target,
       run.converge(met_limit, 0.0);
       return;
     }
-    const SearchRun::Evaluation next = run.evaluate(point, options.derivatives);
+    const SearchRun::Evaluation next = run.evaluate(point, with);
     if (next.outcome == SearchRun::Outcome::Ended) {
       run.trace(step.norm());
       return;

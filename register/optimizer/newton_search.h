@@ -12,7 +12,7 @@ namespace af::registration {
 /// that bend upwards or hardly at all get a small curvature, and curvatures above Gauss and
 /// Newton's (of Derivatives::NormalEquations) are reduced to it, so that Newton's steps lead up.
 /// Evaluates the target thirteen times.
-ScaledMatrix measured_curvature(OptimizationTarget& target,
+ScaledMatrix measured_curvature(LeastSquaresTarget& target,
                                 Derivatives derivatives,
                                 double step_mm);
 
@@ -30,7 +30,7 @@ struct NewtonOptions {
 /// Optimization, 2006, Sec. 6.2). The last step is not evaluated, nor is a step for which no budget
 /// is left: the result then has the value of the point before.
 /// \test NewtonSearch.TakesFewEvaluationsWithACurvatureThatIsNearlyRight
-void newton_search(OptimizationTarget& target,
+void newton_search(LeastSquaresTarget& target,
                    ScaledMatrix curvature,
                    const NewtonOptions& options,
                    const SearchBudget& budget,

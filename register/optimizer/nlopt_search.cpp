@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <memory>
 #include <nlopt.h>
 
 #include "base/error.h"
@@ -66,16 +67,14 @@ void require_success(nlopt_result code, const char* what) {
   check(code >= 0, what);
 }
 
-}  // namespace
-
-void NloptSearch::maximize(OptimizationTarget& target,
-                           const OptimizerOptions& options,
-                           const SearchBudget& budget,
-                           OptimizerResult& result) const {
+void nlopt_search(nlopt_algorithm algorithm,
+                  OptimizationTarget& target,
+                  const OptimizerOptions& options,
+                  const SearchBudget& budget,
+                  OptimizerResult& result) {
   SearchRun run(target, budget, result);
-  if (!run.begin(Derivatives::None)) return;
-  const OptimizerHandle optimizer(nlopt_create(
-      algorithm_ == NloptAlgorithm::Bobyqa ? NLOPT_LN_BOBYQA : NLOPT_LN_NELDERMEAD, 6));
+  if (!run.begin()) return;
+  const OptimizerHandle optimizer(nlopt_create(algorithm, 6));
   check(optimizer != nullptr, "NLopt gives an optimiser");
   Callback callback{
       target, options.initial_step_mm, run, optimizer.get(), result.value, false, false, nullptr};
@@ -93,6 +92,22 @@ void NloptSearch::maximize(OptimizationTarget& target,
   if (callback.failure) std::rethrow_exception(callback.failure);
   run.trace(options.final_step_mm);
   if (!callback.has_ended) run.converge(callback.met_limit, options.final_step_mm);
+}
+
+}  // namespace
+
+void bobyqa(OptimizationTarget& target,
+            const OptimizerOptions& options,
+            const SearchBudget& budget,
+            OptimizerResult& result) {
+  nlopt_search(NLOPT_LN_BOBYQA, target, options, budget, result);
+}
+
+void nelder_mead(OptimizationTarget& target,
+                 const OptimizerOptions& options,
+                 const SearchBudget& budget,
+                 OptimizerResult& result) {
+  nlopt_search(NLOPT_LN_NELDERMEAD, target, options, budget, result);
 }
 
 }  // namespace af::registration

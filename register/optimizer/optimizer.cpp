@@ -15,42 +15,16 @@
 namespace af::registration {
 namespace {
 
-using OptimizerPointer = std::unique_ptr<Optimizer>;
-
-struct KnownOptimizer {
-  const char* name;
-  const char* help;
-  OptimizerPointer (*make)();
-};
-
-template <typename Search>
-OptimizerPointer make_search() {
-  return std::make_unique<Search>();
-}
-template <GaussNewton::Curvature curvature>
-OptimizerPointer make_gauss_newton() {
-  return std::make_unique<GaussNewton>(curvature);
-}
-template <NloptAlgorithm algorithm>
-OptimizerPointer make_nlopt() {
-  return std::make_unique<NloptSearch>(algorithm);
-}
-
-/// Every optimiser there is; a new one joins here.
+/// A new optimiser joins here.
 constexpr std::array kOptimizers = {
-    KnownOptimizer{
-        "best-neighbor", "the paper's: best of 12 neighbours", make_search<BestNeighborSearch>},
-    KnownOptimizer{"gauss-newton",
-                   "steps from normal equations",
-                   make_gauss_newton<GaussNewton::Curvature::OfTarget>},
-    KnownOptimizer{"quasi-newton",
-                   "gauss-newton that learns missing curvature from its steps",
-                   make_gauss_newton<GaussNewton::Curvature::Learned>},
-    KnownOptimizer{"gradient", "steps along the gradient", make_search<GradientAscent>},
-    KnownOptimizer{
-        "bobyqa", "quadratic models in a trust region", make_nlopt<NloptAlgorithm::Bobyqa>},
-    KnownOptimizer{"nelder-mead", "simplex", make_nlopt<NloptAlgorithm::NelderMead>},
-    KnownOptimizer{"cma-es", "random populations, for far starts", make_search<CmaEs>},
+    Optimizer{"best-neighbor", "the paper's: best of 12 neighbours", best_neighbor_search},
+    Optimizer{"gauss-newton", "steps from normal equations", gauss_newton},
+    Optimizer{
+        "quasi-newton", "gauss-newton that learns missing curvature from its steps", quasi_newton},
+    Optimizer{"gradient", "steps along the gradient", gradient_ascent},
+    Optimizer{"bobyqa", "quadratic models in a trust region", bobyqa},
+    Optimizer{"nelder-mead", "simplex", nelder_mead},
+    Optimizer{"cma-es", "random populations, for far starts", cma_es},
 };
 
 }  // namespace
@@ -102,10 +76,12 @@ void OptimizationTarget::evaluate_all(std::span<const ScaledParameters> points,
   for (std::size_t i = 0; i < points.size(); ++i) values[i] = evaluate(points[i]);
 }
 
-std::optional<TargetValue> OptimizationTarget::evaluate_with(const ScaledParameters& /*point*/,
-                                                             Derivatives /*derivatives*/) {
-  check(false, "this target has no derivatives");
-  return std::nullopt;
+std::span<const Optimizer> known_optimizers() {
+  return kOptimizers;
+}
+
+const Optimizer& known_optimizer(const std::string& name) {
+  return required_row(kOptimizers, "optimizer", name);
 }
 
 std::vector<std::string> optimizer_names() {
@@ -114,19 +90,6 @@ std::vector<std::string> optimizer_names() {
 
 std::string optimizer_help() {
   return help_of(kOptimizers);
-}
-
-std::string optimizer_list() {
-  const std::array needs{"-", "gradient", "normal-equations"};
-  std::string text;
-  for (const KnownOptimizer& row : kOptimizers)
-    text += std::string(row.name) + "\t" + needs.at(static_cast<std::size_t>(row.make()->needs())) +
-            "\t" + row.help + "\n";
-  return text;
-}
-
-std::unique_ptr<Optimizer> make_optimizer(const std::string& name) {
-  return required_row(kOptimizers, "optimizer", name).make();
 }
 
 }  // namespace af::registration

@@ -3,10 +3,10 @@
 
 #include <array>
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <span>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include <Eigen/Core>
@@ -38,7 +38,7 @@ using ScaledMatrix = Eigen::Matrix<double, 6, 6>;
 /// The twelve points one step away from a point along one parameter, forth and back.
 std::array<ScaledParameters, 12> neighbors(const ScaledParameters& point, double step_mm);
 
-/// What an optimiser asks of its target; each value includes the ones before.
+/// What an optimiser asks of its target.
 enum class Derivatives {
   None,
   Gradient,         ///< first derivatives
@@ -63,13 +63,24 @@ class OptimizationTarget {
   /// them at the same time.
   virtual void evaluate_all(std::span<const ScaledParameters> points,
                             std::span<std::optional<double>> values);
-  /// With derivatives; only for targets that were made for optimisers that need them.
-  virtual std::optional<TargetValue> evaluate_with(const ScaledParameters& point,
-                                                   Derivatives derivatives);
   /// The point, or one near it that known limits admit (it may still turn out inadmissible).
   [[nodiscard]] virtual ScaledParameters nearest_admissible(const ScaledParameters& point) const {
     return point;
   }
+};
+
+/// A target with first derivatives.
+class DifferentiableTarget : public OptimizationTarget {
+ public:
+  /// The matrix is 0. nullopt: the point is inadmissible.
+  virtual std::optional<TargetValue> evaluate_with_gradient(const ScaledParameters& point) = 0;
+};
+
+/// A target with a positive semi-definite approximation of its negative Hessian, too.
+class LeastSquaresTarget : public DifferentiableTarget {
+ public:
+  virtual std::optional<TargetValue> evaluate_with_normal_equations(
+      const ScaledParameters& point) = 0;
 };
 
 struct OptimizerOptions {
@@ -103,29 +114,37 @@ struct SearchBudget {
   std::uint64_t random_key = 0;  ///< of (seed, case, start); only cma-es draws
 };
 
-/// A search from the origin of the scaled parameters. Stateless, hence re-entrant: the same target,
-/// options and budget give the same result.
-class Optimizer {
- public:
-  virtual ~Optimizer() = default;
-
-  [[nodiscard]] virtual Derivatives needs() const { return Derivatives::None; }
-
-  /// `result` is overwritten, its memory reused.
-  virtual void maximize(OptimizationTarget& target,
+/// A search from the origin of the scaled parameters. What it takes for a target says what it asks
+/// of it. The same target, options and budget give the same result, which is overwritten, its
+/// memory reused.
+template <typename Target>
+using Search = void (*)(Target& target,
                         const OptimizerOptions& options,
                         const SearchBudget& budget,
-                        OptimizerResult& result) const = 0;
+                        OptimizerResult& result);
+
+struct Optimizer {
+  const char* name;
+  const char* help;
+  std::variant<Search<OptimizationTarget>, Search<DifferentiableTarget>, Search<LeastSquaresTarget>>
+      search;
+
+  [[nodiscard]] Derivatives needs() const { return static_cast<Derivatives>(search.index()); }
+  void maximize(LeastSquaresTarget& target,
+                const OptimizerOptions& options,
+                const SearchBudget& budget,
+                OptimizerResult& result) const {
+    std::visit([&](const auto run) { run(target, options, budget, result); }, search);
+  }
 };
 
-/// Names that make_optimizer() knows, and one line that explains them.
+/// Every optimiser there is.
+std::span<const Optimizer> known_optimizers();
+/// InputError that lists the known names.
+const Optimizer& known_optimizer(const std::string& name);
+
+/// Their names, and one line that explains them.
 std::vector<std::string> optimizer_names();
 std::string optimizer_help();
-/// One line per optimiser: name, what it needs of a measure ("-", "gradient", "normal-equations"),
-/// help; tabs between.
-std::string optimizer_list();
-
-/// InputError that lists the known names.
-std::unique_ptr<Optimizer> make_optimizer(const std::string& name);
 
 }  // namespace af::registration

@@ -6,6 +6,13 @@
 #include <limits>
 
 namespace af::registration {
+namespace {
+
+std::optional<TargetValue> value_alone(const std::optional<double>& value) {
+  return value.has_value() ? std::optional(TargetValue{*value}) : std::nullopt;
+}
+
+}  // namespace
 
 SearchRun::SearchRun(OptimizationTarget& target,
                      const SearchBudget& budget,
@@ -19,8 +26,8 @@ SearchRun::SearchRun(OptimizationTarget& target,
   result_.trace.clear();
 }
 
-std::optional<TargetValue> SearchRun::begin(Derivatives derivatives) {
-  const Evaluation start = evaluate(ScaledParameters::Zero(), derivatives);
+std::optional<TargetValue> SearchRun::begin(const WithDerivatives& with) {
+  const Evaluation start = evaluate(ScaledParameters::Zero(), with);
   if (start.outcome == Outcome::Inadmissible) result_.stop_reason = StopReason::StartInadmissible;
   if (start.outcome != Outcome::Value) return std::nullopt;
   result_.value = start.target.value;
@@ -48,11 +55,10 @@ SearchRun::Evaluation SearchRun::counted(const std::optional<TargetValue>& found
   return {Outcome::Value, *found};
 }
 
-SearchRun::Evaluation SearchRun::evaluate(const ScaledParameters& point, Derivatives derivatives) {
+SearchRun::Evaluation SearchRun::evaluate(const ScaledParameters& point,
+                                          const WithDerivatives& with) {
   if (!has_budget()) return {};
-  if (derivatives != Derivatives::None) return counted(target_.evaluate_with(point, derivatives));
-  const std::optional<double> value = target_.evaluate(point);
-  return counted(value.has_value() ? std::optional(TargetValue{*value}) : std::nullopt);
+  return counted(with ? with(point) : value_alone(target_.evaluate(point)));
 }
 
 std::span<const SearchRun::Evaluation> SearchRun::evaluate_all(
@@ -65,9 +71,7 @@ std::span<const SearchRun::Evaluation> SearchRun::evaluate_all(
   evaluations_.assign(points.size(), {});
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (!has_budget()) break;
-    const std::optional<double>& value = values_[i];
-    evaluations_[i] =
-        counted(value.has_value() ? std::optional(TargetValue{*value}) : std::nullopt);
+    evaluations_[i] = counted(value_alone(values_[i]));
     if (evaluations_[i].outcome == Outcome::Ended) break;
   }
   return evaluations_;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
@@ -16,8 +17,11 @@ class SearchRun {
   /// Resets `result`.
   SearchRun(OptimizationTarget& target, const SearchBudget& budget, OptimizerResult& result);
 
+  /// Evaluates a target at a point with derivatives; nullopt: it is inadmissible.
+  using WithDerivatives = std::function<std::optional<TargetValue>(const ScaledParameters& point)>;
+
   /// Evaluates the start (the origin), which becomes the best point. nullopt: the search has ended.
-  std::optional<TargetValue> begin(Derivatives derivatives);
+  std::optional<TargetValue> begin(const WithDerivatives& with = {});
 
   /// What evaluate() found.
   enum class Outcome { Value, Inadmissible, Ended };
@@ -26,8 +30,8 @@ class SearchRun {
     TargetValue target;
   };
   /// Evaluates one point; Ended, with the reason in the result, when the budget is spent or the
-  /// value is not finite.
-  Evaluation evaluate(const ScaledParameters& point, Derivatives derivatives = Derivatives::None);
+  /// value is not finite. Without `with`: its value alone.
+  Evaluation evaluate(const ScaledParameters& point, const WithDerivatives& with = {});
   /// The same, without derivatives, for points that do not depend on each other. They are counted
   /// in their order: after a point that ends the search, all others are Ended.
   std::span<const Evaluation> evaluate_all(std::span<const ScaledParameters> points);

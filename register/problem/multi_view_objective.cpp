@@ -12,8 +12,14 @@
 namespace af::registration {
 namespace {
 
+/// The measure of a view by what it can do, which problems(StageOptions) asks before.
+template <typename Measure>
+const Measure& measure_as(const ObjectiveView& view) {
+  return dynamic_cast<const Measure&>(*view.measure);
+}
+
 /// Value and gradient from the derivative by every pixel.
-NormalEquations gradient_equations(const SimilarityMeasure& measure,
+NormalEquations gradient_equations(const DifferentiableMeasure& measure,
                                    std::span<const float> drr,
                                    std::span<const float> planes,
                                    std::span<float> by_pixel,
@@ -196,18 +202,21 @@ ObjectiveValue MultiViewObjective::evaluate_with(const RigidTransform& room_from
   if (poses_[0].is_in_range)
     pool_->for_each(static_cast<int>(views_.size()), [&](int task, int /*slot*/) {
       const auto view = static_cast<std::size_t>(task);
-      const SimilarityMeasure& measure = *views_[view].measure;
       Scratch& scratch = scratch_of(0, view);
       scratch.planes.resize(6 * scratch.drr.size());
       const PoseGradients gradients{pivot_room_point, scratch.planes};
       evaluate_view(0, room_from_ct, view, scratch, gradients, [&](NormalEquations& part) {
         if (derivatives == Derivatives::NormalEquations) {
-          part = measure.normal_equations(scratch.drr, scratch.planes, *scratch.similarity);
+          part = measure_as<LeastSquaresMeasure>(views_[view])
+                     .normal_equations(scratch.drr, scratch.planes, *scratch.similarity);
           return;
         }
         scratch.by_pixel.resize(scratch.drr.size());
-        part = gradient_equations(
-            measure, scratch.drr, scratch.planes, scratch.by_pixel, *scratch.similarity);
+        part = gradient_equations(measure_as<DifferentiableMeasure>(views_[view]),
+                                  scratch.drr,
+                                  scratch.planes,
+                                  scratch.by_pixel,
+                                  *scratch.similarity);
       });
     });
   forget_images_of_refused(0);
@@ -229,8 +238,9 @@ ObjectiveValue MultiViewObjective::evaluate_scores(const RigidTransform& room_fr
       scratch.by_pixel.resize(scratch.drr.size());
       const PoseGradients gradients{pivot_room_point, scratch.planes};
       evaluate_view(0, room_from_ct, view, scratch, gradients, [&](NormalEquations& part) {
-        part.value = views_[view].measure->evaluate_with_derivative(
-            scratch.drr, scratch.by_pixel, *scratch.similarity);
+        part.value =
+            measure_as<DifferentiableMeasure>(views_[view])
+                .evaluate_with_derivative(scratch.drr, scratch.by_pixel, *scratch.similarity);
         found[view] = tile_scores(views_[view].view.roi, tiles, scratch.planes, scratch.by_pixel);
       });
     });

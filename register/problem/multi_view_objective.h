@@ -60,7 +60,7 @@ class MultiViewObjective {
 
   /// With derivatives, into `result`: by small motions of the CT in the room about
   /// `pivot_room_point`, as PoseGradients (per rad, per mm). Derivatives::Gradient leaves the
-  /// matrix 0. The measures must have what is asked for.
+  /// matrix 0. The measures must be LeastSquaresMeasures, for a Gradient DifferentiableMeasures.
   ObjectiveValue evaluate_with(const RigidTransform& room_from_ct,
                                const Eigen::Vector3d& pivot_room_point,
                                Derivatives derivatives,
@@ -68,7 +68,8 @@ class MultiViewObjective {
 
   /// The views one by one, the gradient of each split over `tiles` x `tiles` parts of its region:
   /// sums of (derivative by a DRR pixel) x (derivative of that pixel by the pose). The measures
-  /// must have derivatives. `scores`: one per view; unchanged when the pose is inadmissible.
+  /// must be DifferentiableMeasures. `scores`: one per view; unchanged when the pose is
+  /// inadmissible.
   ObjectiveValue evaluate_scores(const RigidTransform& room_from_ct,
                                  const Eigen::Vector3d& pivot_room_point,
                                  int tiles,

@@ -55,15 +55,21 @@ std::optional<PoseMatrix> projected_motion_basis(const RigidTransform& room_from
 
 /// The poses that a stage searches: scaled parameters about the stage's start, judged by its
 /// objective. \test PoseTarget.DerivativesAreThoseOfItsValue
-class PoseTarget final : public OptimizationTarget {
+class PoseTarget final : public LeastSquaresTarget {
  public:
   PoseTarget(MultiViewObjective& objective, PoseFrame frame, const ParameterScaling& scaling);
 
   std::optional<double> evaluate(const ScaledParameters& point) override;
   void evaluate_all(std::span<const ScaledParameters> points,
                     std::span<std::optional<double>> values) override;
-  std::optional<TargetValue> evaluate_with(const ScaledParameters& point,
-                                           Derivatives derivatives) override;
+  /// As far as the objective's measures have what is asked for.
+  std::optional<TargetValue> evaluate_with_gradient(const ScaledParameters& point) override {
+    return evaluate_with(point, Derivatives::Gradient);
+  }
+  std::optional<TargetValue> evaluate_with_normal_equations(
+      const ScaledParameters& point) override {
+    return evaluate_with(point, Derivatives::NormalEquations);
+  }
   /// Clamps to the motion ranges of all views.
   [[nodiscard]] ScaledParameters nearest_admissible(const ScaledParameters& point) const override;
 
@@ -76,6 +82,7 @@ class PoseTarget final : public OptimizationTarget {
   [[nodiscard]] std::int64_t rays_outside() const { return rays_outside_; }
 
  private:
+  std::optional<TargetValue> evaluate_with(const ScaledParameters& point, Derivatives derivatives);
   void count(const ObjectiveValue& value);
 
   MultiViewObjective& objective_;

@@ -9,7 +9,7 @@
 #include "files/csv_table.h"
 #include "ranks/provenance.h"
 #include "register/results/registration_columns.h"
-#include "register/verdict/registrar.h"
+#include "register/verdict/registration.h"
 
 namespace af::registration {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "register/method/registration.h"
+#include "register/problem/registration_problem.h"
 #include "study/study_file.h"
 
 namespace af::registration {

@@ -15,7 +15,7 @@ namespace af::registration {
 /// over the used pixels, from -1 to 1; 0 when the DRR is constant there. With x^ and d^ the centred
 /// images of norm 1, NCC = 1 - |x^ - d^|^2 / 2: a sum of squares, whose normal equations gain and
 /// offset do not enter. \test CrossCorrelation.IsOneForAnyRisingLinearMap
-class CrossCorrelation final : public SimilarityMeasure {
+class CrossCorrelation final : public DifferentiableMeasure, public LeastSquaresMeasure {
  public:
   /// InputError when the reference has problems.
   explicit CrossCorrelation(const SimilarityReference& reference);

@@ -12,7 +12,7 @@ namespace af::registration {
 ///
 /// over the pixels whose 3 x 3 neighbours are all in use. A sum of squares like NCC.
 /// \test GradientCorrelation.HardlyNoticesASlowRamp
-class GradientCorrelation final : public SimilarityMeasure {
+class GradientCorrelation final : public DifferentiableMeasure, public LeastSquaresMeasure {
  public:
   /// InputError as GradientReference.
   explicit GradientCorrelation(const SimilarityReference& reference);

@@ -34,7 +34,7 @@ struct EntropyScore {
 /// DRR value counts in four bins by a cubic B-spline window (Thevenaz and Unser, IEEE TIP 9(12),
 /// 2000; Mattes et al., IEEE TMI 22(1), 2003), its range mapped to the bins that have a neighbour
 /// on one side and two on the other, which makes every score differentiable.
-class JointHistogramMeasure : public SimilarityMeasure {
+class JointHistogramMeasure : public DifferentiableMeasure {
  public:
   [[nodiscard]] double evaluate(std::span<const float> drr,
                                 SimilarityWorkspace& workspace) const override;

@@ -19,7 +19,7 @@ namespace af::registration {
 /// the curvature (after the gain has followed, but for a term that vanishes with the gradient).
 /// \test RobustGradient.OccludersCostABoundedPrice,
 /// RobustGradient.CurvesLessThanItsNormalEquationsByTheReweighting
-class RobustGradient final : public SimilarityMeasure {
+class RobustGradient final : public DifferentiableMeasure, public LeastSquaresMeasure {
  public:
   /// InputError as GradientReference, or when most of the X-ray has no gradient.
   RobustGradient(const SimilarityReference& reference, double residual_scale);

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <concepts>
+#include <type_traits>
 
 #include "base/named_rows.h"
 #include "base/number_text.h"
@@ -48,55 +50,56 @@ void append_value_problems(const SimilarityReference& reference, std::vector<std
   }
 }
 
-using MeasurePointer = std::unique_ptr<SimilarityMeasure>;
-
-struct KnownMeasure {
-  const char* name;
-  const char* help;
-  bool has_derivative;
-  bool has_normal_equations;
-  MeasurePointer (*make)(const SimilarityOptions& options, const SimilarityReference& reference);
-};
-
 template <typename Measure>
-MeasurePointer make_plain(const SimilarityOptions& /*options*/,
-                          const SimilarityReference& reference) {
+std::unique_ptr<Measure> plain(const SimilarityOptions& /*options*/,
+                               const SimilarityReference& reference) {
   return std::make_unique<Measure>(reference);
 }
 template <typename Measure>
-MeasurePointer make_histogram(const SimilarityOptions& options,
-                              const SimilarityReference& reference) {
+std::unique_ptr<Measure> histogram(const SimilarityOptions& options,
+                                   const SimilarityReference& reference) {
   return std::make_unique<Measure>(reference, options.bins, options.has_smooth_histogram);
 }
-MeasurePointer make_entropy(const SimilarityOptions& options,
-                            const SimilarityReference& reference) {
+std::unique_ptr<DifferenceEntropy> entropy(const SimilarityOptions& options,
+                                           const SimilarityReference& reference) {
   return std::make_unique<DifferenceEntropy>(reference, options.bins);
 }
-MeasurePointer make_tiled(const SimilarityOptions& options, const SimilarityReference& reference) {
+std::unique_ptr<TiledCorrelation> tiled(const SimilarityOptions& options,
+                                        const SimilarityReference& reference) {
   return std::make_unique<TiledCorrelation>(reference, options.tiles);
 }
-MeasurePointer make_robust(const SimilarityOptions& options, const SimilarityReference& reference) {
+std::unique_ptr<RobustGradient> robust(const SimilarityOptions& options,
+                                       const SimilarityReference& reference) {
   return std::make_unique<RobustGradient>(reference, options.residual_scale);
 }
 
-/// Every measure there is; a new one joins here.
+/// The row of a maker, whose return type says what the measure can do.
+template <auto make>
+constexpr KnownMeasure row(const char* name, const char* help) {
+  using Measure = typename std::invoke_result_t<decltype(make),
+                                                const SimilarityOptions&,
+                                                const SimilarityReference&>::element_type;
+  return {name,
+          help,
+          std::derived_from<Measure, DifferentiableMeasure>,
+          std::derived_from<Measure, LeastSquaresMeasure>,
+          [](const SimilarityOptions& options, const SimilarityReference& reference)
+              -> std::unique_ptr<SimilarityMeasure> { return make(options, reference); }};
+}
+
+/// A new measure joins here.
 constexpr std::array kMeasures = {
-    KnownMeasure{"mi", "mutual information", true, false, make_histogram<MutualInformation>},
-    KnownMeasure{"nmi",
-                 "normalised mutual information",
-                 true,
-                 false,
-                 make_histogram<NormalizedMutualInformation>},
-    KnownMeasure{"ncc", "cross-correlation", true, true, make_plain<CrossCorrelation>},
-    KnownMeasure{"tncc", "cross-correlation of tiles", false, true, make_tiled},
-    KnownMeasure{"gc", "correlation of gradients", true, true, make_plain<GradientCorrelation>},
-    KnownMeasure{"gd", "gradient difference", false, false, make_plain<GradientDifference>},
-    KnownMeasure{"rg", "robust residuals of gradients", true, true, make_robust},
-    KnownMeasure{"pi", "pattern intensity", false, false, make_plain<PatternIntensity>},
-    KnownMeasure{"entropy", "entropy of the difference", false, false, make_entropy},
-    KnownMeasure{
-        "ssd", "sum of squared differences", true, true, make_plain<SumOfSquaredDifferences>},
-    KnownMeasure{"go", "gradient orientation", false, false, make_plain<GradientOrientation>},
+    row<histogram<MutualInformation>>("mi", "mutual information"),
+    row<histogram<NormalizedMutualInformation>>("nmi", "normalised mutual information"),
+    row<plain<CrossCorrelation>>("ncc", "cross-correlation"),
+    row<tiled>("tncc", "cross-correlation of tiles"),
+    row<plain<GradientCorrelation>>("gc", "correlation of gradients"),
+    row<plain<GradientDifference>>("gd", "gradient difference"),
+    row<robust>("rg", "robust residuals of gradients"),
+    row<plain<PatternIntensity>>("pi", "pattern intensity"),
+    row<entropy>("entropy", "entropy of the difference"),
+    row<plain<SumOfSquaredDifferences>>("ssd", "sum of squared differences"),
+    row<plain<GradientOrientation>>("go", "gradient orientation"),
 };
 
 }  // namespace
@@ -129,20 +132,6 @@ NormalEquations& NormalEquations::operator+=(const NormalEquations& other) {
   return *this;
 }
 
-double SimilarityMeasure::evaluate_with_derivative(std::span<const float> /*drr*/,
-                                                   std::span<float> /*derivative*/,
-                                                   SimilarityWorkspace& /*workspace*/) const {
-  check(false, "this similarity measure has no derivative");
-  return 0.0;
-}
-
-NormalEquations SimilarityMeasure::normal_equations(std::span<const float> /*drr*/,
-                                                    std::span<const float> /*planes*/,
-                                                    SimilarityWorkspace& /*workspace*/) const {
-  check(false, "this similarity measure has no normal equations");
-  return {};
-}
-
 std::unique_ptr<SimilarityWorkspace> SimilarityMeasure::make_workspace() const {
   return std::make_unique<SimilarityWorkspace>();
 }
@@ -173,6 +162,14 @@ std::vector<std::string> problems(const SimilarityOptions& options) {
   return found;
 }
 
+std::span<const KnownMeasure> known_measures() {
+  return kMeasures;
+}
+
+const KnownMeasure& known_measure(const std::string& name) {
+  return required_row(kMeasures, "similarity", name);
+}
+
 std::vector<std::string> similarity_names() {
   return names_of(kMeasures);
 }
@@ -181,28 +178,10 @@ std::string similarity_help() {
   return help_of(kMeasures);
 }
 
-std::string similarity_list() {
-  std::string text;
-  for (const KnownMeasure& row : kMeasures)
-    text += std::string(row.name) + "\t" + (row.has_derivative ? "gradient" : "-") + "\t" +
-            (row.has_normal_equations ? "normal-equations" : "-") + "\t" + row.help + "\n";
-  return text;
-}
-
-bool similarity_has_derivative(const std::string& name) {
-  const KnownMeasure* const measure = find_row(kMeasures, name);
-  return measure != nullptr && measure->has_derivative;
-}
-
-bool similarity_has_normal_equations(const std::string& name) {
-  const KnownMeasure* const measure = find_row(kMeasures, name);
-  return measure != nullptr && measure->has_normal_equations;
-}
-
 std::unique_ptr<SimilarityMeasure> make_similarity(const SimilarityOptions& options,
                                                    const SimilarityReference& reference) {
   throw_if_any(problems(options));
-  return find_row(kMeasures, options.name)->make(options, reference);
+  return known_measure(options.name).make(options, reference);
 }
 
 }  // namespace af::registration

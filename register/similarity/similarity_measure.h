@@ -69,20 +69,27 @@ class SimilarityMeasure {
   [[nodiscard]] virtual double evaluate(std::span<const float> drr,
                                         SimilarityWorkspace& workspace) const = 0;
 
-  /// Only of measures with similarity_has_derivative(). The value, and in `derivative` (as many
-  /// pixels) its derivative by every DRR pixel. The value is evaluate()'s up to rounding.
-  virtual double evaluate_with_derivative(std::span<const float> drr,
-                                          std::span<float> derivative,
-                                          SimilarityWorkspace& workspace) const;
-
-  /// Only of measures with similarity_has_normal_equations(): sums of squared residuals. `planes`:
-  /// derivatives of every DRR pixel by six parameters, six planes one after the other.
-  [[nodiscard]] virtual NormalEquations normal_equations(std::span<const float> drr,
-                                                         std::span<const float> planes,
-                                                         SimilarityWorkspace& workspace) const;
-
   /// Without memory, for measures that need none.
   [[nodiscard]] virtual std::unique_ptr<SimilarityWorkspace> make_workspace() const;
+};
+
+/// A measure that a DRR pixel changes smoothly.
+class DifferentiableMeasure : public virtual SimilarityMeasure {
+ public:
+  /// The value, and in `derivative` (as many pixels) its derivative by every DRR pixel. The value
+  /// is evaluate()'s up to rounding.
+  virtual double evaluate_with_derivative(std::span<const float> drr,
+                                          std::span<float> derivative,
+                                          SimilarityWorkspace& workspace) const = 0;
+};
+
+/// A sum of squared residuals. It may lack a derivative by every pixel.
+class LeastSquaresMeasure : public virtual SimilarityMeasure {
+ public:
+  /// `planes`: derivatives of every DRR pixel by six parameters, six planes one after the other.
+  [[nodiscard]] virtual NormalEquations normal_equations(std::span<const float> drr,
+                                                         std::span<const float> planes,
+                                                         SimilarityWorkspace& workspace) const = 0;
 };
 
 struct SimilarityOptions {
@@ -101,15 +108,23 @@ struct SimilarityOptions {
 std::vector<std::string> similarity_name_problems(const std::string& name);
 std::vector<std::string> problems(const SimilarityOptions& options);
 
+/// What is known of a measure before it has a reference. Its maker's type says what it can do.
+struct KnownMeasure {
+  const char* name;
+  const char* help;
+  bool is_differentiable;  ///< made as a DifferentiableMeasure
+  bool is_least_squares;   ///< made as a LeastSquaresMeasure
+  std::unique_ptr<SimilarityMeasure> (*make)(const SimilarityOptions& options,
+                                             const SimilarityReference& reference);
+};
+/// Every measure there is.
+std::span<const KnownMeasure> known_measures();
+/// InputError that lists the known names.
+const KnownMeasure& known_measure(const std::string& name);
+
 /// Names that make_similarity() knows, and one line that explains them.
 std::vector<std::string> similarity_names();
 std::string similarity_help();
-/// One line per measure: name, "gradient" or "-", "normal-equations" or "-", help; tabs between.
-std::string similarity_list();
-
-/// What optimisers may ask of a measure, by its name.
-bool similarity_has_derivative(const std::string& name);
-bool similarity_has_normal_equations(const std::string& name);
 
 /// InputError when the options or the reference have problems.
 std::unique_ptr<SimilarityMeasure> make_similarity(const SimilarityOptions& options,

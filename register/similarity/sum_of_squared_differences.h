@@ -16,7 +16,7 @@ namespace af::registration {
 ///
 /// It needs equal scales: X-rays must be line integrals of the same attenuation.
 /// \test SumOfSquaredDifferences.OfAShiftedImageIsMinusTheSquaredShift
-class SumOfSquaredDifferences final : public SimilarityMeasure {
+class SumOfSquaredDifferences final : public DifferentiableMeasure, public LeastSquaresMeasure {
  public:
   /// InputError when the reference has problems.
   explicit SumOfSquaredDifferences(const SimilarityReference& reference);

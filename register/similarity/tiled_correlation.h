@@ -17,7 +17,7 @@ namespace af::registration {
 /// The region is cut into tiles x tiles; tiles with less than a quarter of their pixels in use are
 /// left out. Shading, a heel effect or a bright rod disturb only the tiles that they cross.
 /// \test TiledCorrelation.IgnoresAnOffsetAndAGainOfItsOwnInEveryTile
-class TiledCorrelation final : public SimilarityMeasure {
+class TiledCorrelation final : public LeastSquaresMeasure {
  public:
   /// InputError when the reference has problems or no tile is left.
   TiledCorrelation(const SimilarityReference& reference, int tiles);

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <memory>
+#include <optional>
 #include <vector>
 
-#include "register/method/registration.h"
+#include "register/method/prepared_stage.h"
 #include "register/verdict/verdict.h"
 
 namespace af::registration {
@@ -18,7 +18,7 @@ class PoseExaminer {
   /// The level of the image pyramids that it looks at where views have it.
   static int coarsest_level();
 
-  /// `problem`: as for a RegistrationRunner. `silhouette_mm`: the margin about the CT's silhouette
+  /// `problem`: of the registration. `silhouette_mm`: the margin about the CT's silhouette
   /// within which poses are judged, by gradient correlation
   /// (RegistrationOptions::silhouette_mm()); 0: over twice the region.
   PoseExaminer(const RegistrationProblem& problem, double silhouette_mm);
@@ -33,8 +33,22 @@ class PoseExaminer {
                                                    bool with_backgrounds = false);
 
  private:
+  struct JudgedView {
+    RegistrationProblem alone;          ///< the problem with this view only
+    std::vector<PreparedStage> stages;  ///< coarse and fine, to be evaluated only
+
+    /// The share of the X-ray's gradients that a pose explains to a stage.
+    [[nodiscard]] double share_at(std::size_t stage, const RigidTransform& room_from_ct);
+    /// Mean share in detail over the poses that the field holds of four `mm` beside one; NaN for
+    /// none.
+    [[nodiscard]] double share_beside(const RigidTransform& room_from_ct, double mm);
+  };
+  static std::optional<JudgedView> judged_view(const RegistrationProblem& problem,
+                                               std::size_t view,
+                                               double silhouette_mm);
+
   bool in_silhouette_ = false;
-  std::vector<std::unique_ptr<RegistrationRunner>> views_;  ///< none where nothing can be judged
+  std::vector<std::optional<JudgedView>> views_;  ///< none where nothing can be judged
 };
 
 /// The farther, the better failures were told from successes (docs/uncertainty.md, on 2 to 16 mm);

@@ -21,7 +21,7 @@ constexpr int kTiles = 8;
 /// The stage as the curvature needs it: with derivatives, and with an optimiser that they suit.
 /// Robust gradients are of no use within silhouettes (see PoseExaminer).
 StageOptions differentiable(StageOptions stage) {
-  if (!similarity_has_derivative(stage.similarity.name))
+  if (!known_measure(stage.similarity.name).is_differentiable)
     stage.similarity.name = stage.silhouette_mm > 0.0 ? "gc" : "rg";
   stage.similarity.has_smooth_histogram = true;
   stage.optimizer = "gradient";
@@ -49,24 +49,22 @@ void UncertaintyOptions::describe(Fields& field) {
 UncertaintyEstimator::UncertaintyEstimator(std::shared_ptr<const RegistrationProblem> problem,
                                            const RegistrationOptions& method,
                                            const UncertaintyOptions& options,
-                                           std::shared_ptr<ThreadPool> pool)
+                                           const std::shared_ptr<ThreadPool>& pool)
     : problem_(std::move(problem)), options_(options) {
   if (options_.is_left_out) return;
   for (const RegistrationView& view : problem_->views) views_.push_back(view.view);
-  ChainOptions ends{"ends", {}};
+  std::vector<StageOptions> ends;
   for (const ChainOptions& chain : method.chains) {
     const bool ends_with_finish = !method.finish.stages.empty();
-    if (!ends_with_finish || ends.stages.empty()) {
+    if (!ends_with_finish || ends.empty()) {
       const StageOptions& last = (ends_with_finish ? method.finish : chain).stages.back();
-      ends.stages.push_back(differentiable(last));
+      ends.push_back(differentiable(last));
       similarities_.push_back(last.similarity.name);
     }
-    stage_of_chain_[chain.name] = ends.stages.size() - 1;
+    stage_of_chain_[chain.name] = ends.size() - 1;
   }
-  RegistrationOptions stages;
-  stages.chains = {ends};
   try {
-    ends_ = std::make_unique<RegistrationRunner>(problem_, stages, std::move(pool));
+    ends_ = prepared_stages(*problem_, ends, pool);
   } catch (const InputError&) {
     // rg, which replaces measures without derivative, rejects X-rays without gradients over most of
     // the region; the registration's own measure may accept them.
@@ -85,14 +83,13 @@ double UncertaintyEstimator::add_covariance(const RegistrationResult& result,
   if (!basis.has_value()) return UncertaintyReport::kNone;
   const std::size_t stage = stage_of_chain_.at(result.chain);
   // Values over the region say nothing of what silhouettes show, and the other way round.
-  const bool in_silhouette = ends_->options().chains.front().stages[stage].silhouette_mm > 0.0;
+  const bool in_silhouette = ends_[stage].options.silhouette_mm > 0.0;
   const auto is_of_the_stage = [&](const ViewValue& value) {
     return value.in_silhouette == in_silhouette;
   };
   if (!std::ranges::all_of(view_values, is_of_the_stage)) return UncertaintyReport::kNone;
-  MultiViewObjective* const objective = ends_->objective_at(result.room_from_ct, stage);
-  if (objective == nullptr) return UncertaintyReport::kNone;
-  const auto information = information_at(*objective, frame, *basis, kTiles);
+  if (!ends_[stage].narrow_to(*problem_, result.room_from_ct)) return UncertaintyReport::kNone;
+  const auto information = information_at(ends_[stage].objective, frame, *basis, kTiles);
   if (!information.has_value()) return UncertaintyReport::kNone;
   const auto sandwich = sandwich_covariance(*information);
   if (!sandwich.has_value()) return UncertaintyReport::kNone;
@@ -114,7 +111,7 @@ double UncertaintyEstimator::add_covariance(const RegistrationResult& result,
 UncertaintyReport UncertaintyEstimator::report(const RegistrationResult& result,
                                                std::span<const ViewValue> view_values) {
   UncertaintyReport report;
-  if (ends_ == nullptr) return report;
+  if (!is_on()) return report;
   if (!result.has_pose()) {
     report.confidence = 0.0;
     return report;

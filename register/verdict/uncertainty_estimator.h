@@ -8,7 +8,8 @@
 
 #include "base/described_fields.h"
 #include "base/thread_pool.h"
-#include "register/method/registration.h"
+#include "register/method/prepared_stage.h"
+#include "register/method/registration_result.h"
 #include "register/verdict/uncertainty_report.h"
 #include "register/verdict/verdict.h"
 
@@ -29,15 +30,15 @@ struct UncertaintyOptions {
 /// UncertaintyEstimator.ForetellsTheSpreadOfNoisyXrays
 class UncertaintyEstimator {
  public:
-  /// `problem` and `method`: as for the RegistrationRunner of the results. Reports stay empty when
+  /// `problem` and `method`: of the registration. Reports stay empty when
   /// uncertainty is left out, and when X-rays have no gradients to measure the curvature.
   UncertaintyEstimator(std::shared_ptr<const RegistrationProblem> problem,
                        const RegistrationOptions& method,
                        const UncertaintyOptions& options,
-                       std::shared_ptr<ThreadPool> pool = nullptr);
+                       const std::shared_ptr<ThreadPool>& pool = nullptr);
 
   /// Whether reports say anything.
-  [[nodiscard]] bool is_on() const { return ends_ != nullptr; }
+  [[nodiscard]] bool is_on() const { return !ends_.empty(); }
 
   /// `view_values`: of PoseExaminer, with backgrounds, at the result's end. Covariance and TREs are
   /// NaN when there is no end, when some motion from it is admissible to neither side, when too
@@ -57,8 +58,7 @@ class UncertaintyEstimator {
   std::vector<View> views_;
   std::map<std::string, std::size_t> stage_of_chain_;
   std::vector<std::string> similarities_;  ///< of the stages, as registered with
-  std::unique_ptr<RegistrationRunner>
-      ends_;  ///< a stage for every way to end; none: nothing is said
+  std::vector<PreparedStage> ends_;        ///< one for every way to end; none: nothing is said
 };
 
 }  // namespace af::registration

@@ -11,6 +11,7 @@
 #include "base/joined.h"
 #include "register/method/presets.h"
 #include "register/verdict/pose_examiner.h"
+#include "register/verdict/registration.h"
 #include "register/verdict/verdict.h"
 
 namespace af::registration {
@@ -142,10 +143,10 @@ std::optional<std::vector<ViewValue>> values_with(const Change& change,
   change.make(*changed);
   std::optional<std::vector<ViewValue>> best;
   try {
-    RegistrationRunner runner(changed, options);
+    Registration registration(changed, options);
     PoseExaminer examiner(*changed, 0.0);
     for (const RigidTransform& start : starts) {
-      std::vector<ViewValue> values = examiner.view_values(runner.run(start).room_from_ct);
+      std::vector<ViewValue> values = examiner.view_values(registration.search(start).room_from_ct);
       if (!best.has_value() || mean_of(values) > mean_of(*best)) best = std::move(values);
     }
   } catch (const InputError&) {  // an X-ray without gradients

@@ -6,7 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "register/method/registration.h"
+#include "register/method/registration_result.h"
+#include "register/problem/registration_problem.h"
 #include "register/verdict/verdict.h"
 
 namespace af::registration {

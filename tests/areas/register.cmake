@@ -3,11 +3,11 @@ af_add_test(
   register_tests
   SOURCES unit/register/similarity/mutual_information_test.cpp unit/register/similarity/cross_correlation_test.cpp
           unit/register/similarity/similarity_measures_test.cpp unit/register/optimizer/best_neighbor_search_test.cpp
-          unit/register/optimizer/optimizers_test.cpp unit/register/problem/stage_view_test.cpp
+          unit/register/optimizer/optimizers_test.cpp unit/register/method/prepared_stage_test.cpp
           unit/register/problem/fiducial_mask_test.cpp unit/register/problem/silhouette_test.cpp
           unit/register/method/method_options_test.cpp unit/register/problem/parameter_scaling_test.cpp
           unit/register/problem/multi_view_objective_test.cpp unit/register/method/correction_test.cpp
-          unit/register/method/registration_test.cpp unit/register/verdict/verdict_test.cpp
+          unit/register/verdict/registration_test.cpp unit/register/verdict/verdict_test.cpp
           unit/register/verdict/pose_covariance_test.cpp unit/register/verdict/uncertainty_estimator_test.cpp
   LIBS af_register_verdict af_geometry af_files)
 af_add_test(

@@ -32,18 +32,20 @@ RegistrationOptions quick_options() {
   return options;
 }
 
-Registrar registrar_of(const test::SmallCase& small) {
-  return {small.problem, RegistrationRunner(small.problem, quick_options()), {}};
+Registration registration_of(const test::SmallCase& small) {
+  Registration registration(small.problem, quick_options());
+  registration.examine_ends({});
+  return registration;
 }
 
 TEST(RegisterStarts, GivesTheRecordsOfASerialRunOnAnyRankCount) {
   const Communicator world = Communicator::world();
   const test::SmallCase small = test::small_case();
   const std::vector<RigidTransform> starts = some_starts(small, 7);
-  Registrar registrar = registrar_of(small);
+  Registration registration = registration_of(small);
   const test::SharedFolder folder;
   const std::vector<RegistrationRecord> records =
-      register_starts(registrar, starts, {folder / "p", "registrations", {}}, world);
+      register_starts(registration, starts, {folder / "p", "registrations", {}}, world);
   if (!world.is_root()) {
     EXPECT_TRUE(records.empty());
     return;
@@ -51,7 +53,7 @@ TEST(RegisterStarts, GivesTheRecordsOfASerialRunOnAnyRankCount) {
   ASSERT_EQ(records.size(), starts.size());
   const std::size_t best = best_record(records);
   for (std::size_t i = 0; i < records.size(); ++i) {
-    const RegistrationResult expected = registrar.runner().run(starts[i]);
+    const RegistrationResult expected = registration.search(starts[i]);
     const RegistrationResult& found = records[i].result;
     EXPECT_EQ(records[i].start_index, static_cast<std::int64_t>(i));
     EXPECT_EQ(found.start_room_from_ct.matrix(), starts[i].matrix());
@@ -71,14 +73,14 @@ TEST(RegisterStarts, GivesTheRecordsOfASerialRunOnAnyRankCount) {
 TEST(RegisterStarts, CopesWithFewerStartsThanRanks) {
   const Communicator world = Communicator::world();
   const test::SmallCase small = test::small_case();
-  Registrar registrar = registrar_of(small);
+  Registration registration = registration_of(small);
   const test::SharedFolder folder;
   const UnfinishedWork work = {folder / "p", "registrations", {}};
-  const auto records = register_starts(registrar, some_starts(small, 1), work, world);
+  const auto records = register_starts(registration, some_starts(small, 1), work, world);
   EXPECT_EQ(records.size(), world.is_root() ? 1U : 0U);
   // One start leaves nothing to be kept.
   EXPECT_FALSE(std::filesystem::exists(work.folder));
-  EXPECT_TRUE(register_starts(registrar, {}, work, world).empty());
+  EXPECT_TRUE(register_starts(registration, {}, work, world).empty());
 }
 
 TEST(RegisterStarts, KeepsTheTraceOfTheFirstWhenNoStartHasASimilarity) {
@@ -87,10 +89,10 @@ TEST(RegisterStarts, KeepsTheTraceOfTheFirstWhenNoStartHasASimilarity) {
   for (RegistrationView& view : small.problem->views)
     view.renderer = std::make_shared<const test::NarrowDrr>(
         view.renderer, small.problem->nominal_room_from_ct, 1e-6);
-  Registrar registrar = registrar_of(small);
+  Registration registration = registration_of(small);
   const test::SharedFolder folder;
-  const auto records =
-      register_starts(registrar, some_starts(small, 5), {folder / "p", "registrations", {}}, world);
+  const auto records = register_starts(
+      registration, some_starts(small, 5), {folder / "p", "registrations", {}}, world);
   if (!world.is_root()) return;
   ASSERT_EQ(records.size(), 5U);
   EXPECT_EQ(best_record(records), 0U);

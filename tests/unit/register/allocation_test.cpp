@@ -87,7 +87,7 @@ MultiViewObjective field_objective(const std::string& similarity, int threads) {
   reference.drr_range = {0.0, 10000.0};
   SimilarityOptions options;
   options.name = similarity;
-  options.has_smooth_histogram = similarity_has_derivative(similarity);
+  options.has_smooth_histogram = known_measure(similarity).is_differentiable;
   const std::shared_ptr<const SimilarityMeasure> measure = make_similarity(options, reference);
   const ObjectiveView one{view, renderer, measure, std::nullopt};
   return MultiViewObjective({one, one}, std::make_shared<ThreadPool>(threads));
@@ -108,9 +108,9 @@ TEST_P(AllocationOf, AnEvaluationIsZeroAfterTheFirstOnes) {
       objective.evaluate_all(poses, values);
       for (const RigidTransform& pose : poses) {
         objective.evaluate(pose);
-        if (similarity_has_derivative(GetParam()))
+        if (known_measure(GetParam()).is_differentiable)
           objective.evaluate_with(pose, {1.0, 2.0, 3.0}, Derivatives::Gradient, equations);
-        if (similarity_has_normal_equations(GetParam()))
+        if (known_measure(GetParam()).is_least_squares)
           objective.evaluate_with(pose, {1.0, 2.0, 3.0}, Derivatives::NormalEquations, equations);
       }
     };
@@ -122,11 +122,11 @@ TEST_P(AllocationOf, ARegistrationDoesNotGrowWithItsEvaluations) {
   const test::SmallCase small = test::small_case();
   RegistrationOptions options = preset_options("paper");
   options.use_similarity(GetParam());
-  RegistrationRunner runner(small.problem, options);
-  const RegistrationResult result = runner.run(small.problem->nominal_room_from_ct);
+  Registration registration(small.problem, options);
+  const RegistrationResult result = registration.search(small.problem->nominal_room_from_ct);
   ASSERT_GT(result.evaluations, 100);
   const long allocations =
-      allocations_of([&] { (void)runner.run(small.problem->nominal_room_from_ct); });
+      allocations_of([&] { (void)registration.search(small.problem->nominal_room_from_ct); });
   // A few per stage and a trace that doubles its memory, whatever the number of evaluations.
   constexpr long kMostAllocations = 40;
   EXPECT_LE(allocations, kMostAllocations) << result.evaluations << " evaluations";

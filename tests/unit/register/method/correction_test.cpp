@@ -9,7 +9,7 @@
 #include "base/error.h"
 #include "geometry/tre.h"
 #include "register/method/presets.h"
-#include "register/method/registration.h"
+#include "register/verdict/registration.h"
 #include "unit/register/method/narrow_drr.h"
 #include "unit/register/method/registration_cases.h"
 
@@ -91,10 +91,10 @@ struct PlainAndBetter {
 /// Without and with a correction, which must end better by ray casting.
 PlainAndBetter plain_and_better(const test::SmallCase& small, const RegistrationOptions& options) {
   const RegistrationResult plain =
-      RegistrationRunner(small.problem, options).run(start_near_gold(small));
+      Registration(small.problem, options).search(start_near_gold(small));
   const RegistrationResult better =
-      RegistrationRunner(small.problem, corrected(options)).run(start_near_gold(small));
-  RegistrationRunner by_ray_casting(test::small_case().problem, options);
+      Registration(small.problem, corrected(options)).search(start_near_gold(small));
+  Registration by_ray_casting(test::small_case().problem, options);
   EXPECT_GT(by_ray_casting.similarity_at(better.room_from_ct).similarity,
             by_ray_casting.similarity_at(plain.room_from_ct).similarity);
   return {plain, better};
@@ -109,7 +109,7 @@ TEST(Correction, OfAnImageThatStaysEndsBetterByEveryMeasureAndWhereRayCastingDoe
   const test::SmallCase small = spoilt_case();
   for (const std::string& similarity : similarity_names()) {
     SCOPED_TRACE(similarity);
-    const bool has_squares = similarity_has_normal_equations(similarity);
+    const bool has_squares = known_measure(similarity).is_least_squares;
     RegistrationOptions options =
         one_stage(similarity, has_squares ? "gauss-newton" : "best-neighbor");
     const auto [plain, better] = plain_and_better(small, options);
@@ -136,7 +136,7 @@ TEST(Correction, IsOfAnyOptimiserAndTheSearchThatItDoesByRayCasting) {
   for (const std::string& optimizer : optimizer_names()) {
     SCOPED_TRACE(optimizer);
     RegistrationOptions options = one_stage("ncc", optimizer);
-    const bool has_derivatives = make_optimizer(optimizer)->needs() != Derivatives::None;
+    const bool has_derivatives = known_optimizer(optimizer).needs() != Derivatives::None;
     if (!has_derivatives) options.chains.front().stages.front().search.final_step_mm = 0.1;
     options.correction.max_casts = 1000;
     const auto [plain, better] = plain_and_better(small, options);
@@ -155,13 +155,13 @@ TEST(Correction, EndsWhenThePoseStandsStillOrItsCastsAreSpent) {
   RegistrationOptions options = corrected(one_stage("ncc", "gauss-newton"));
   options.correction.max_casts = 20;
   const CorrectionReport still =
-      *RegistrationRunner(small.problem, options).run(start_near_gold(small)).correction;
+      *Registration(small.problem, options).search(start_near_gold(small)).correction;
   EXPECT_TRUE(still.stood_still);
   EXPECT_LE(still.last_mm, options.correction.tolerance_mm);
   EXPECT_LT(still.casts, 20);
   options.correction.max_casts = 1;
   const CorrectionReport once =
-      *RegistrationRunner(small.problem, options).run(start_near_gold(small)).correction;
+      *Registration(small.problem, options).search(start_near_gold(small)).correction;
   EXPECT_EQ(once.casts, 1);
   EXPECT_FALSE(once.stood_still);
   EXPECT_EQ(once.last_mm, once.moved_mm);
@@ -172,9 +172,9 @@ TEST(Correction, LeavesAnEndThatDidNotConverge) {
   RegistrationOptions options = one_stage("ncc", "gauss-newton");
   options.max_evaluations = 3;
   const RegistrationResult plain =
-      RegistrationRunner(small.problem, options).run(start_near_gold(small));
+      Registration(small.problem, options).search(start_near_gold(small));
   const RegistrationResult same =
-      RegistrationRunner(small.problem, corrected(options)).run(start_near_gold(small));
+      Registration(small.problem, corrected(options)).search(start_near_gold(small));
   EXPECT_EQ(same.stop_reason, StopReason::EvaluationBudgetSpent);
   EXPECT_EQ(same.room_from_ct.matrix(), plain.room_from_ct.matrix());
   EXPECT_EQ(same.correction->casts, 0);
@@ -189,10 +189,10 @@ TEST(Correction, OfAPortfolioCorrectsTheChosenEndAndJudgesIt) {
   options.judge.stage = StageOptions();
   options.judge.stage.similarity.name = "rg";
   options.judge.enough_value = 2.0;  // never
-  RegistrationRunner runner(small.problem, options);
-  const RegistrationResult result = runner.run(start_near_gold(small));
+  Registration registration(small.problem, options);
+  const RegistrationResult result = registration.search(start_near_gold(small));
   EXPECT_LT(distance_mm(small, result.room_from_ct, small.gold_room_from_ct), kGaussNewtonErrorMm);
-  EXPECT_EQ(result.similarity, runner.similarity_at(result.room_from_ct).similarity);
+  EXPECT_EQ(result.similarity, registration.similarity_at(result.room_from_ct).similarity);
   // It comes after all stages.
   EXPECT_EQ(result.trace.back().pass, 2);
 }
@@ -204,7 +204,7 @@ TEST(Correction, LeavesAnEndWhoseCorrectedPoseNoFieldHolds) {
     view.renderer = std::make_shared<const test::NarrowDrr>(view.renderer, start, 1e-3);
   small.problem->nominal_room_from_ct = start;
   const RegistrationOptions options = corrected(one_stage("ncc", "gauss-newton"));
-  const RegistrationResult result = RegistrationRunner(small.problem, options).run(start);
+  const RegistrationResult result = Registration(small.problem, options).search(start);
   EXPECT_LT((result.room_from_ct.translation() - start.translation()).norm(), 1e-3);
   EXPECT_GE(result.correction->casts, 1);
   // Not 0 mm, which would read as an end that ray casting confirmed.
@@ -217,9 +217,9 @@ TEST(Correction, HasNoDistanceWhenNoEvaluationIsLeft) {
   const test::SmallCase small = spoilt_case();
   RegistrationOptions options = one_stage("ncc", "gauss-newton");
   options.max_evaluations =
-      RegistrationRunner(small.problem, options).run(start_near_gold(small)).evaluations;
+      Registration(small.problem, options).search(start_near_gold(small)).evaluations;
   const RegistrationResult spent =
-      RegistrationRunner(small.problem, corrected(options)).run(start_near_gold(small));
+      Registration(small.problem, corrected(options)).search(start_near_gold(small));
   EXPECT_NE(spent.stop_reason, StopReason::EvaluationBudgetSpent);
   EXPECT_EQ(spent.correction->casts, 0);
   EXPECT_TRUE(std::isnan(spent.correction->moved_mm));
@@ -230,13 +230,13 @@ TEST(Correction, StaysInsideTheMotionRange) {
   test::SmallCase small = spoilt_case();
   RegistrationOptions options = one_stage("ncc", "gauss-newton");
   const RegistrationResult plain =
-      RegistrationRunner(small.problem, options).run(start_near_gold(small));
+      Registration(small.problem, options).search(start_near_gold(small));
   // A range whose wall stands a hundredth of a millimetre from the end of look-up.
   for (RegistrationView& view : small.problem->views)
     view.limit = MotionLimit{PoseFrame::about(plain.room_from_ct, small.problem->center_ct_mm),
                              MotionRange{1e-4, 0.01}};
   const RegistrationResult result =
-      RegistrationRunner(small.problem, corrected(options)).run(plain.room_from_ct);
+      Registration(small.problem, corrected(options)).search(plain.room_from_ct);
   EXPECT_EQ(result.stop_reason, StopReason::PinnedAtLimit);
   EXPECT_GT(result.correction->moved_mm, 0.0);
   EXPECT_TRUE(small.problem->views.front().limit->range.contains(
@@ -246,12 +246,12 @@ TEST(Correction, StaysInsideTheMotionRange) {
 TEST(Correction, HasTheSameBitsOnAnyNumberOfThreadsAndInAnotherRunner) {
   const test::SmallCase small = spoilt_case();
   const RegistrationOptions options = corrected(one_stage("rg", "gauss-newton"));
-  RegistrationRunner alone(small.problem, options);
-  RegistrationRunner other(small.problem, options);
-  RegistrationRunner threads(small.problem, options, std::make_shared<ThreadPool>(3));
-  const RegistrationResult first = alone.run(start_near_gold(small));
-  for (RegistrationRunner* const runner : {&alone, &other, &threads}) {
-    const RegistrationResult again = runner->run(start_near_gold(small));
+  Registration alone(small.problem, options);
+  Registration other(small.problem, options);
+  Registration threads(small.problem, options, std::make_shared<ThreadPool>(3));
+  const RegistrationResult first = alone.search(start_near_gold(small));
+  for (Registration* const registration : {&alone, &other, &threads}) {
+    const RegistrationResult again = registration->search(start_near_gold(small));
     EXPECT_EQ(again.room_from_ct.matrix(), first.room_from_ct.matrix());
     EXPECT_EQ(again.correction->casts, first.correction->casts);
     EXPECT_EQ(again.correction->last_mm, first.correction->last_mm);
@@ -262,7 +262,7 @@ TEST(Correction, IsRefusedWithoutRayCastingOrTarget) {
   const RegistrationOptions options = corrected(one_stage("ncc", "gauss-newton"));
   const auto refusal = [&](const test::SmallCase& small) {
     try {
-      RegistrationRunner(small.problem, options);
+      Registration(small.problem, options);
     } catch (const InputError& error) {
       return std::string(error.what());
     }

@@ -4,8 +4,8 @@
 #include <memory>
 
 #include "drr/ray_cast_drr.h"
-#include "register/method/registration.h"
 #include "register/problem/pose_target.h"
+#include "register/verdict/registration.h"
 #include "support/ct_phantoms.h"
 
 namespace af::test {

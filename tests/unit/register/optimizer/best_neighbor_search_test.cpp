@@ -25,7 +25,7 @@ OptimizerResult search(OptimizationTarget& target,
                        const OptimizerOptions& options = {5.0, 0.5},
                        int max_evaluations = 100000) {
   OptimizerResult result;
-  BestNeighborSearch().maximize(target, options, {max_evaluations, 0}, result);
+  best_neighbor_search(target, options, {max_evaluations, 0}, result);
   return result;
 }
 
@@ -134,7 +134,7 @@ TEST(OptimizerOptions, NamesStepsThatCannotBe) {
 
 TEST(Optimizer, AnUnknownNameIsRefusedWithTheKnownOnes) {
   try {
-    make_optimizer("newton");
+    known_optimizer("newton");
     FAIL() << "must throw";
   } catch (const InputError& error) {
     EXPECT_EQ(error.what(), "optimizer = 'newton': must be one of " + joined(optimizer_names()));

@@ -11,7 +11,7 @@
 namespace af::test {
 
 /// A function as an optimiser's target; it keeps every point asked for.
-class FunctionTarget final : public registration::OptimizationTarget {
+class FunctionTarget final : public registration::LeastSquaresTarget {
  public:
   using Value = std::function<std::optional<double>(const registration::ScaledParameters&)>;
   using Equations = std::function<registration::TargetValue(const registration::ScaledParameters&)>;
@@ -32,9 +32,12 @@ class FunctionTarget final : public registration::OptimizationTarget {
     points.push_back(point);
     return value_(point);
   }
-  std::optional<registration::TargetValue> evaluate_with(
-      const registration::ScaledParameters& point,
-      registration::Derivatives /*derivatives*/) override {
+  std::optional<registration::TargetValue> evaluate_with_gradient(
+      const registration::ScaledParameters& point) override {
+    return evaluate_with_normal_equations(point);
+  }
+  std::optional<registration::TargetValue> evaluate_with_normal_equations(
+      const registration::ScaledParameters& point) override {
     const std::optional<double> value = evaluate(point);
     if (!value.has_value()) return std::nullopt;
     registration::TargetValue result = equations_(point);

@@ -58,7 +58,7 @@ test::FunctionTarget walled_quadratic(const ScaledParameters& wall) {
     return nearest(p) == p ? free->evaluate(p) : std::nullopt;
   };
   const auto equations = [=](const ScaledParameters& p) {
-    return *free->evaluate_with(p, Derivatives::NormalEquations);
+    return *free->evaluate_with_normal_equations(p);
   };
   return test::FunctionTarget(value, equations, nearest);
 }
@@ -68,7 +68,7 @@ OptimizerResult search(const std::string& name,
                        int max_evaluations = 20000,
                        std::uint64_t key = 1) {
   OptimizerResult result;
-  make_optimizer(name)->maximize(target, {2.0, kFinalStepMm, 16}, {max_evaluations, key}, result);
+  known_optimizer(name).maximize(target, {2.0, kFinalStepMm, 16}, {max_evaluations, key}, result);
   return result;
 }
 
@@ -276,16 +276,16 @@ TEST(CmaEs, FindsTheHighestOfManyPeaks) {
   };
   test::FunctionTarget target(value);
   OptimizerResult result;
-  make_optimizer("cma-es")->maximize(target, {3.0, 1e-3, 100}, {100000, 7}, result);
+  known_optimizer("cma-es").maximize(target, {3.0, 1e-3, 100}, {100000, 7}, result);
   EXPECT_LT((result.point - ScaledParameters::Constant(2.4)).norm(), 0.01);
   test::FunctionTarget other(value);
   OptimizerResult other_key;
-  make_optimizer("cma-es")->maximize(other, {3.0, 1e-3, 100}, {100000, 8}, other_key);
+  known_optimizer("cma-es").maximize(other, {3.0, 1e-3, 100}, {100000, 8}, other_key);
   EXPECT_NE(other.points[1], target.points[1]);
 }
 
 TEST(Optimizers, RefuseUnknownNames) {
-  EXPECT_THROW(make_optimizer("unheard-of"), InputError);
+  EXPECT_THROW(known_optimizer("unheard-of"), InputError);
 }
 
 NewtonOptions newton_options() {

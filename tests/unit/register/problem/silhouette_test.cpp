@@ -6,8 +6,8 @@
 #include <gtest/gtest.h>
 
 #include "register/method/presets.h"
-#include "register/method/registration.h"
 #include "register/verdict/pose_examiner.h"
+#include "register/verdict/registration.h"
 #include "unit/register/method/registration_cases.h"
 
 namespace af::registration {
@@ -133,12 +133,12 @@ TEST(SilhouetteStage, FindsBonesThatTheWholeRegionLoses) {
   const auto distance_mm = [&](const RigidTransform& pose) {
     return (pose.translation() - small.gold_room_from_ct.translation()).norm();
   };
-  const RegistrationResult found = RegistrationRunner(small.problem, options).run(start);
+  const RegistrationResult found = Registration(small.problem, options).search(start);
   // The background's edges within the margin bias the end: half a pixel of 2 mm in the room.
   EXPECT_LT(distance_mm(found.room_from_ct), 1.0);
   EXPECT_TRUE(std::isfinite(found.similarity));
   for (StageOptions& whole : options.chains.front().stages) whole.silhouette_mm = 0.0;
-  const RegistrationResult lost = RegistrationRunner(small.problem, options).run(start);
+  const RegistrationResult lost = Registration(small.problem, options).search(start);
   EXPECT_GT(distance_mm(lost.room_from_ct), distance_mm(found.room_from_ct));
 }
 
@@ -152,10 +152,10 @@ TEST(SilhouetteStage, EndsWhereTheBodyIsNotSeen) {
   // 3 x 3 pixels a view are fewer than an objective needs.
   stage.pixel_step = 12;
   options.chains = {{"bone", {stage}}};
-  RegistrationRunner runner(small.problem, options);
-  const RegistrationResult result = runner.run(small.gold_room_from_ct);
+  Registration registration(small.problem, options);
+  const RegistrationResult result = registration.search(small.gold_room_from_ct);
   EXPECT_EQ(result.stop_reason, StopReason::CtOutsideRoi);
-  EXPECT_FALSE(runner.similarity_at(small.gold_room_from_ct).is_admissible);
+  EXPECT_FALSE(registration.similarity_at(small.gold_room_from_ct).is_admissible);
   const auto values = PoseExaminer(*small.problem, 5.0).view_values(small.gold_room_from_ct);
   for (const ViewValue& value : values) EXPECT_TRUE(value.in_silhouette);
 }

@@ -60,7 +60,7 @@ class LinearRenderer final : public DrrRenderer {
 };
 
 /// -|x - d|^2 over the pixels, and its derivative; nothing normalised.
-class PlainSquares final : public SimilarityMeasure {
+class PlainSquares final : public DifferentiableMeasure {
  public:
   explicit PlainSquares(std::vector<float> xray) : xray_(std::move(xray)) {}
 
@@ -161,8 +161,8 @@ TEST(UncertaintyEstimator, ForetellsTheSpreadOfNoisyXrays) {
     const auto problem = std::make_shared<RegistrationProblem>(*small.problem);
     for (RegistrationView& view : problem->views)
       for (float& value : view.xray.pixels) value += noise(random);
-    RegistrationRunner runner(problem, squares());
-    const RegistrationResult result = runner.run(small.gold_room_from_ct);
+    Registration registration(problem, squares());
+    const RegistrationResult result = registration.search(small.gold_room_from_ct);
     const UncertaintyReport report =
         UncertaintyEstimator(problem, squares(), {}).report(result, std::vector<ViewValue>{{1, 1}});
     ASSERT_TRUE(std::isfinite(report.covariance_deg_mm[0]));
@@ -204,7 +204,7 @@ TEST(UncertaintyEstimator, ForetellsHowLittleOneViewShowsOfDepth) {
     const auto problem = std::make_shared<RegistrationProblem>(*small.problem);
     for (float& value : problem->views.front().xray.pixels) value += noise(random);
     const RegistrationResult result =
-        RegistrationRunner(problem, squares()).run(small.gold_room_from_ct);
+        Registration(problem, squares()).search(small.gold_room_from_ct);
     const UncertaintyReport report =
         UncertaintyEstimator(problem, squares(), {}).report(result, std::vector<ViewValue>{{1, 1}});
     ASSERT_TRUE(std::isfinite(report.covariance_deg_mm[0]));

@@ -4,16 +4,14 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <memory>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <vector>
 
-#include "base/thread_pool.h"
-#include "drr/drr_renderer.h"
+#include "geometry/rigid_transform.h"
 #include "register/method/correction.h"
-#include "register/method/registration_options.h"
-#include "register/problem/registration_problem.h"
+#include "register/optimizer/optimizer.h"
 
 namespace af::registration {
 
@@ -72,47 +70,6 @@ struct RegistrationResult {
                     correction,
                     seconds);
   }
-};
-
-/// Registers one case from any number of starts. Construction does what all starts share (smoothed
-/// and decimated references, histograms' ranges, X-ray bins); runs reuse the buffers. One run at a
-/// time spreads over the threads of a pool: views, and poses that do not depend on each other. Runs
-/// at the same time need a runner each. A result depends on problem, options and start alone (its
-/// seconds excepted), not on the number of threads. The DRR range of a case is that of the DRR at
-/// the nominal pose over the region of interest grown by half its size to every side. \test
-/// Registration.TwoViewsRecoverAKnownPose
-class RegistrationRunner {
- public:
-  /// InputError when options or problem have problems, or when the nominal pose is outside a field.
-  /// `pool`: none means the calling thread alone.
-  RegistrationRunner(std::shared_ptr<const RegistrationProblem> problem,
-                     const RegistrationOptions& options,
-                     std::shared_ptr<ThreadPool> pool = nullptr);
-  ~RegistrationRunner();
-  RegistrationRunner(RegistrationRunner&&) noexcept;
-  RegistrationRunner& operator=(RegistrationRunner&&) noexcept;
-
-  /// `start_index` is a key of random numbers.
-  [[nodiscard]] RegistrationResult run(const RigidTransform& start_room_from_ct,
-                                       std::int64_t start_index = 0);
-
-  /// The value of RegistrationResult::similarity at a pose.
-  [[nodiscard]] ObjectiveValue similarity_at(const RigidTransform& room_from_ct);
-  /// The objective of one stage, counted over the chains, at a pose.
-  [[nodiscard]] ObjectiveValue similarity_at(const RigidTransform& room_from_ct, std::size_t stage);
-
-  /// The objective of a stage, counted over the chains; of one that looks within silhouettes, over
-  /// those at a pose. nullptr when too little of them is visible. It lives until the next call or
-  /// run.
-  [[nodiscard]] MultiViewObjective* objective_at(const RigidTransform& room_from_ct,
-                                                 std::size_t stage);
-
-  [[nodiscard]] const RegistrationProblem& problem() const;
-  [[nodiscard]] const RegistrationOptions& options() const;
-
- private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
 };
 
 }  // namespace af::registration

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "register/problem/stage_view.h"
+#include "register/method/prepared_stage.h"
 
 #include <gtest/gtest.h>
 

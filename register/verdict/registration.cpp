@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "register/method/registration.h"
+#include "register/verdict/registration.h"
 
 #include <algorithm>
 #include <chrono>
@@ -10,7 +10,6 @@
 #include "base/error.h"
 #include "base/hash_random.h"
 #include "geometry/tre.h"
-#include "register/method/prepared_stage.h"
 #include "register/optimizer/newton_search.h"
 #include "register/problem/pose_target.h"
 
@@ -75,11 +74,21 @@ class ReusedImages {
   MultiViewObjective& objective_;
 };
 
-/// The value at a pose where there is nothing to compare.
-ObjectiveValue inadmissible_value() {
-  ObjectiveValue value;
-  value.similarity = std::numeric_limits<double>::quiet_NaN();
+/// The mean over the views of what a portfolio's judge says of a pose.
+ObjectiveValue value_of_judge(PreparedStage& judge,
+                              const RegistrationProblem& problem,
+                              const RigidTransform& room_from_ct) {
+  ObjectiveValue value = judge.value_at(problem, room_from_ct);
+  value.similarity /= static_cast<double>(problem.views.size());
   return value;
+}
+
+std::optional<ParameterScaling> scaling_at(const RegistrationProblem& problem,
+                                           std::span<const View> views,
+                                           const RigidTransform& room_from_ct,
+                                           std::span<const Eigen::Vector3d> points_ct) {
+  return projected_motion_scaling(
+      room_from_ct, problem.center_ct_mm, points_ct, views, problem.isocenter_point);
 }
 
 /// Differences over this many mm to both sides average over a field's nodes, yet are small beside
@@ -101,53 +110,39 @@ std::vector<std::string> correction_problems(const RegistrationProblem& problem,
   return found;
 }
 
-}  // namespace
+/// One start on its way through the parts of a registration.
+struct Run {
+  const RegistrationProblem& problem;
+  const RegistrationOptions& options;
+  std::vector<PreparedStage>& stages;
+  std::optional<PreparedStage>& judge;
+  const std::vector<View>& views;
+  OptimizerResult& search;  ///< of the stage that was searched last
+  std::int64_t start_index;
+  RigidTransform start;                      ///< within the motion range
+  std::optional<ParameterScaling> at_start;  ///< by some of the points, there
+  RegistrationResult result;
 
-struct RegistrationRunner::Impl {
-  std::shared_ptr<const RegistrationProblem> problem;
-  RegistrationOptions options;
-  std::shared_ptr<ThreadPool> pool;
-  std::vector<View> views;
-  std::vector<Eigen::Vector3d> step_points_ct;
-  std::vector<PreparedStage> stages;         ///< of all chains and the finish, in this order
-  std::optional<PreparedStage> judge;        ///< of a portfolio
-  OptimizerResult search;                    ///< reused
-  RigidTransform start;                      ///< of the run, within the motion range
-  std::optional<ParameterScaling> at_start;  ///< by step_points_ct, there
-
-  void prepare();
-  [[nodiscard]] std::optional<ParameterScaling> scaling_at(
-      const RigidTransform& room_from_ct, std::span<const Eigen::Vector3d> points_ct) const;
   /// The scaling with which a stage searches from a pose.
   [[nodiscard]] std::optional<ParameterScaling> scaling_of(
       const PreparedStage& stage, const RigidTransform& room_from_ct) const;
-  [[nodiscard]] std::uint64_t random_key(std::int64_t start_index, std::size_t index) const;
+  [[nodiscard]] std::uint64_t random_key(std::size_t index) const;
   /// Runs the stages of a chain, the first of which is `first`, from `end`; false when one of them
   /// did not converge.
-  bool run_chain(const ChainOptions& chain,
-                 std::size_t first,
-                 std::int64_t start_index,
-                 ChainEnd& end,
-                 RegistrationResult& result);
+  bool run_chain(const ChainOptions& chain, std::size_t first, ChainEnd& end);
   /// Searches one stage from `end`; false when it did not converge. `index`: in the trace,
   /// and a key of random numbers.
-  bool run_stage(PreparedStage& stage,
-                 std::size_t index,
-                 std::int64_t start_index,
-                 ChainEnd& end,
-                 RegistrationResult& result);
+  bool run_stage(PreparedStage& stage, std::size_t index, ChainEnd& end);
   /// Of the search that ended last, "" when it is not pinned.
   [[nodiscard]] std::string pinned_along(const PoseTarget& target,
                                          const PreparedStage& stage) const;
   /// Narrows a stage to the silhouettes at its start; false, and why in `end`, when it cannot.
-  [[nodiscard]] bool narrow_at_start(PreparedStage& stage,
-                                     ChainEnd& end,
-                                     RegistrationResult& result) const;
+  [[nodiscard]] bool narrow_at_start(PreparedStage& stage, ChainEnd& end);
   /// Makes the similarities of ends of several starts comparable: evaluates an end within its own
   /// silhouettes and without reused images.
-  void take_own_similarity(ChainEnd& end, RegistrationResult& result);
+  void take_own_similarity(ChainEnd& end);
   /// Runs the chains and judges their ends: those that have a value, the best one first.
-  std::vector<PortfolioEnd> portfolio_ends(std::int64_t start_index, RegistrationResult& result);
+  std::vector<PortfolioEnd> portfolio_ends();
   /// Whether the best of these ends, which is the first, ends the portfolio.
   [[nodiscard]] bool is_convincing(std::span<const PortfolioEnd> ends) const {
     return ends.front().similarity >= options.judge.enough_value;
@@ -161,74 +156,43 @@ struct RegistrationRunner::Impl {
   /// Whether end `i`, behind the better ones, is to be finished, too.
   [[nodiscard]] bool is_rival(std::span<const PortfolioEnd> ends, std::size_t i) const;
   /// The finish from an end; its similarity is NaN when nothing was searched.
-  PortfolioEnd finished(PortfolioEnd end, std::int64_t start_index, RegistrationResult& result);
+  PortfolioEnd finished(PortfolioEnd end);
   /// The finish from the best end and, unless that convinces, from its rivals; the finish's own
   /// value chooses among those that converged.
-  PortfolioEnd finished_best(std::span<const PortfolioEnd> ends,
-                             std::int64_t start_index,
-                             RegistrationResult& result);
-  void run_portfolio(std::int64_t start_index, RegistrationResult& result);
+  PortfolioEnd finished_best(std::span<const PortfolioEnd> ends);
+  /// One chain, and its finish.
+  void run_alone();
+  /// Several chains, the choice among their ends, and its finish.
+  void run_portfolio();
   /// The finish, from `end`.
-  void run_finish(std::int64_t start_index, ChainEnd& end, RegistrationResult& result) {
-    run_chain(
-        options.finish, stages.size() - options.finish.stages.size(), start_index, end, result);
+  void run_finish(ChainEnd& end) {
+    run_chain(options.finish, stages.size() - options.finish.stages.size(), end);
   }
   /// The correction, from an end that converged.
-  void correct(std::int64_t start_index, ChainEnd& end, RegistrationResult& result);
+  void correct(ChainEnd& end);
   /// Searches the end's last stage with ray-cast DRRs, into `search`; the pose that it found.
   ChainEnd search_by_casting(const ParameterScaling& scaling,
                              const SearchBudget& budget,
-                             const ChainEnd& end,
-                             RegistrationResult& result);
-  ObjectiveValue judged(const RigidTransform& room_from_ct);
-  /// NaN when inadmissible; counted in `result`.
-  double judged(const RigidTransform& room_from_ct, RegistrationResult& result);
-  void append_trace(std::size_t index, const PoseTarget& target, RegistrationResult& result) const;
+                             const ChainEnd& end);
+  /// The judge's value at a pose; NaN when inadmissible.
+  double judged(const RigidTransform& room_from_ct);
+  void append_trace(std::size_t index, const PoseTarget& target);
 };
 
-void RegistrationRunner::Impl::prepare() {
-  const int coarsest = options.coarsest_level();
-  for (const RegistrationView& view : problem->views) {
-    if (static_cast<int>(view.coarse_levels.size()) < coarsest)
-      throw InputError(view_name(view) +
-                       "coarse_levels = " + std::to_string(view.coarse_levels.size()) +
-                       ": the stages need " + std::to_string(coarsest));
-    views.push_back(view.view);
-  }
-  const std::vector<ValueRange> drr_ranges = drr_ranges_at_nominal(*problem);
-  const auto prepared = [&](const StageOptions& stage) {
-    return prepared_stage(*problem, stage, drr_ranges, pool);
-  };
-  step_points_ct = some_points(problem->scaling_points_ct);
-  for (const ChainOptions& chain : options.chains)
-    for (const StageOptions& stage : chain.stages) stages.push_back(prepared(stage));
-  for (const StageOptions& stage : options.finish.stages) stages.push_back(prepared(stage));
-  if (options.chains.size() > 1) judge = prepared(options.judge.stage);
-}
-
-std::optional<ParameterScaling> RegistrationRunner::Impl::scaling_at(
-    const RigidTransform& room_from_ct, std::span<const Eigen::Vector3d> points_ct) const {
-  return projected_motion_scaling(
-      room_from_ct, problem->center_ct_mm, points_ct, views, problem->isocenter_point);
-}
-
-std::optional<ParameterScaling> RegistrationRunner::Impl::scaling_of(
-    const PreparedStage& stage, const RigidTransform& room_from_ct) const {
+std::optional<ParameterScaling> Run::scaling_of(const PreparedStage& stage,
+                                                const RigidTransform& room_from_ct) const {
   return stage.optimizer->needs() == Derivatives::None
-             ? scaling_at(room_from_ct, problem->scaling_points_ct)
+             ? scaling_at(problem, views, room_from_ct, problem.scaling_points_ct)
              : at_start;
 }
 
-std::uint64_t RegistrationRunner::Impl::random_key(std::int64_t start_index,
-                                                   std::size_t index) const {
+std::uint64_t Run::random_key(std::size_t index) const {
   return hash64(
-      options.seed, hash_name(problem->case_name), static_cast<std::uint64_t>(start_index), index);
+      options.seed, hash_name(problem.case_name), static_cast<std::uint64_t>(start_index), index);
 }
 
-void RegistrationRunner::Impl::append_trace(std::size_t index,
-                                            const PoseTarget& target,
-                                            RegistrationResult& result) const {
-  const PoseFrame frame = problem->frame();
+void Run::append_trace(std::size_t index, const PoseTarget& target) {
+  const PoseFrame frame = problem.frame();
   for (const OptimizerIteration& iteration : search.trace)
     result.trace.push_back({static_cast<int>(index),
                             iteration.step_mm,
@@ -237,33 +201,27 @@ void RegistrationRunner::Impl::append_trace(std::size_t index,
                             parameters_from_pose(frame, target.pose(iteration.point))});
 }
 
-std::string RegistrationRunner::Impl::pinned_along(const PoseTarget& target,
-                                                   const PreparedStage& stage) const {
+std::string Run::pinned_along(const PoseTarget& target, const PreparedStage& stage) const {
   if (search.stop_reason != StopReason::PinnedAtLimit) return "";
   return parameter_names(target.limits_at(search.point, stage.options.search.final_step_mm));
 }
 
-bool RegistrationRunner::Impl::run_stage(PreparedStage& stage,
-                                         std::size_t index,
-                                         std::int64_t start_index,
-                                         ChainEnd& end,
-                                         RegistrationResult& result) {
+bool Run::run_stage(PreparedStage& stage, std::size_t index, ChainEnd& end) {
   const std::optional<ParameterScaling> scaling = scaling_of(stage, end.room_from_ct);
   if (!scaling.has_value()) {
     end.stop_reason = StopReason::CtOutsideRoi;
     return false;
   }
-  if (!narrow_at_start(stage, end, result)) return false;
+  if (!narrow_at_start(stage, end)) return false;
   PoseTarget target(
-      stage.objective, PoseFrame::about(end.room_from_ct, problem->center_ct_mm), *scaling);
-  const SearchBudget budget{options.max_evaluations - result.evaluations,
-                            random_key(start_index, index)};
+      stage.objective, PoseFrame::about(end.room_from_ct, problem.center_ct_mm), *scaling);
+  const SearchBudget budget{options.max_evaluations - result.evaluations, random_key(index)};
   {
     // Searches along derivatives take short steps; others try poses all around.
     const ReusedImages reused(stage.objective, stage.optimizer->needs() != Derivatives::None);
     stage.optimizer->maximize(target, stage.options.search, budget, search);
   }
-  append_trace(index, target, result);
+  append_trace(index, target);
   result.evaluations += search.evaluations;
   result.inadmissible += search.inadmissible;
   result.drr_count += target.drr_count();
@@ -278,14 +236,10 @@ bool RegistrationRunner::Impl::run_stage(PreparedStage& stage,
   return is_converged(search.stop_reason);
 }
 
-bool RegistrationRunner::Impl::run_chain(const ChainOptions& chain,
-                                         std::size_t first,
-                                         std::int64_t start_index,
-                                         ChainEnd& end,
-                                         RegistrationResult& result) {
+bool Run::run_chain(const ChainOptions& chain, std::size_t first, ChainEnd& end) {
   for (std::size_t i = 0; i < chain.stages.size(); ++i) {
     end.stage = first + i;
-    if (run_stage(stages[end.stage], end.stage, start_index, end, result)) continue;
+    if (run_stage(stages[end.stage], end.stage, end)) continue;
     // The previous stage ended at the limit, and rounding put its end beyond.
     if (i > 0 && end.stop_reason == StopReason::StartInadmissible)
       end.stop_reason = StopReason::PinnedAtLimit;
@@ -294,35 +248,32 @@ bool RegistrationRunner::Impl::run_chain(const ChainOptions& chain,
   return true;
 }
 
-bool RegistrationRunner::Impl::narrow_at_start(PreparedStage& stage,
-                                               ChainEnd& end,
-                                               RegistrationResult& result) const {
+bool Run::narrow_at_start(PreparedStage& stage, ChainEnd& end) {
   if (stage.silhouettes.empty()) return true;
   result.drr_count += static_cast<std::int64_t>(views.size());
-  if (stage.narrow_to(*problem, end.room_from_ct)) return true;
+  if (stage.narrow_to(problem, end.room_from_ct)) return true;
   end.stop_reason = StopReason::CtOutsideRoi;
   return false;
 }
 
-void RegistrationRunner::Impl::take_own_similarity(ChainEnd& end, RegistrationResult& result) {
+void Run::take_own_similarity(ChainEnd& end) {
   PreparedStage& stage = stages[end.stage];
   const bool has_silhouettes = !stage.silhouettes.empty();
   const bool reused_images = stage.optimizer->needs() != Derivatives::None;
   if (!(has_silhouettes || reused_images) || !std::isfinite(end.similarity)) return;
   result.drr_count += (has_silhouettes ? 2 : 1) * static_cast<std::int64_t>(views.size());
-  if (!stage.narrow_to(*problem, end.room_from_ct)) return;
+  if (!stage.narrow_to(problem, end.room_from_ct)) return;
   const ObjectiveValue value = stage.objective.evaluate(end.room_from_ct);
   if (value.is_admissible) end.similarity = value.similarity;
 }
 
-ChainEnd RegistrationRunner::Impl::search_by_casting(const ParameterScaling& scaling,
-                                                     const SearchBudget& budget,
-                                                     const ChainEnd& end,
-                                                     RegistrationResult& result) {
+ChainEnd Run::search_by_casting(const ParameterScaling& scaling,
+                                const SearchBudget& budget,
+                                const ChainEnd& end) {
   PreparedStage& last = stages[end.stage];
   const Derivatives needs = last.optimizer->needs();
-  MultiViewObjective casting = ray_cast_objective(*problem, last);
-  const PoseFrame frame = PoseFrame::about(end.room_from_ct, problem->center_ct_mm);
+  MultiViewObjective casting = ray_cast_objective(problem, last);
+  const PoseFrame frame = PoseFrame::about(end.room_from_ct, problem.center_ct_mm);
   PoseTarget cast(casting, frame, scaling);
   if (needs == Derivatives::None) {
     OptimizerOptions final_step = last.options.search;
@@ -332,7 +283,7 @@ ChainEnd RegistrationRunner::Impl::search_by_casting(const ParameterScaling& sca
     PoseTarget looked_up(last.objective, frame, scaling);
     const ScaledMatrix curvature = measured_curvature(looked_up, needs, kCurvatureStepMm);
     const auto length_mm = [&](const ScaledParameters& from, const ScaledParameters& to) {
-      return mean_tre_mm(cast.pose(from), cast.pose(to), problem->target_points_ct);
+      return mean_tre_mm(cast.pose(from), cast.pose(to), problem.target_points_ct);
     };
     newton_search(
         cast,
@@ -342,7 +293,7 @@ ChainEnd RegistrationRunner::Impl::search_by_casting(const ParameterScaling& sca
         search);
     result.drr_count += looked_up.drr_count();
   }
-  append_trace(stages.size(), cast, result);
+  append_trace(stages.size(), cast);
   result.evaluations += search.evaluations;
   result.inadmissible += search.inadmissible;
   result.drr_count += cast.drr_count();
@@ -353,20 +304,18 @@ ChainEnd RegistrationRunner::Impl::search_by_casting(const ParameterScaling& sca
           end.stage};
 }
 
-void RegistrationRunner::Impl::correct(std::int64_t start_index,
-                                       ChainEnd& end,
-                                       RegistrationResult& result) {
+void Run::correct(ChainEnd& end) {
   if (!options.correction.is_wanted) return;
   CorrectionReport& report = result.correction.emplace();
   // A chain that ended early, at the limit, may have ended at a level that is not cast.
-  if (!is_converged(end.stop_reason) || !is_cast(*problem, stages[end.stage].options.level)) return;
+  if (!is_converged(end.stop_reason) || !is_cast(problem, stages[end.stage].options.level)) return;
   const auto scaling = scaling_of(stages[end.stage], end.room_from_ct);
   if (!scaling.has_value()) return;
   const SearchBudget budget{
       std::min(options.correction.max_casts, options.max_evaluations - result.evaluations),
-      random_key(start_index, stages.size())};
+      random_key(stages.size())};
   if (budget.max_evaluations <= 0) return;
-  const ChainEnd found = search_by_casting(*scaling, budget, end, result);
+  const ChainEnd found = search_by_casting(*scaling, budget, end);
   report.casts = search.evaluations;
   // By look-up, as for ends that are not corrected; this also checks that the fields hold the pose.
   const ObjectiveValue value = stages[end.stage].objective.evaluate(found.room_from_ct);
@@ -374,10 +323,10 @@ void RegistrationRunner::Impl::correct(std::int64_t start_index,
   if (!std::isfinite(found.similarity) || !value.is_admissible) return;
   const RigidTransform before_last =
       search.trace.size() > 1
-          ? pose_from_parameters(problem->frame(), result.trace.end()[-2].parameters)
+          ? pose_from_parameters(problem.frame(), result.trace.end()[-2].parameters)
           : end.room_from_ct;
-  report.moved_mm = mean_tre_mm(end.room_from_ct, found.room_from_ct, problem->target_points_ct);
-  report.last_mm = mean_tre_mm(before_last, found.room_from_ct, problem->target_points_ct);
+  report.moved_mm = mean_tre_mm(end.room_from_ct, found.room_from_ct, problem.target_points_ct);
+  report.last_mm = mean_tre_mm(before_last, found.room_from_ct, problem.target_points_ct);
   report.stood_still = is_converged(found.stop_reason);
   if (found.stop_reason == StopReason::PinnedAtLimit) {
     end.stop_reason = found.stop_reason;
@@ -387,22 +336,13 @@ void RegistrationRunner::Impl::correct(std::int64_t start_index,
   end.similarity = value.similarity;
 }
 
-ObjectiveValue RegistrationRunner::Impl::judged(const RigidTransform& room_from_ct) {
-  if (!judge->narrow_to(*problem, room_from_ct)) return inadmissible_value();
-  ObjectiveValue value = judge->objective.evaluate(room_from_ct);
-  value.similarity /= static_cast<double>(views.size());
-  return value;
-}
-
-double RegistrationRunner::Impl::judged(const RigidTransform& room_from_ct,
-                                        RegistrationResult& result) {
-  const ObjectiveValue value = judged(room_from_ct);
+double Run::judged(const RigidTransform& room_from_ct) {
+  const ObjectiveValue value = value_of_judge(*judge, problem, room_from_ct);
   result.drr_count += value.drr_count;
   return value.similarity;
 }
 
-std::vector<PortfolioEnd> RegistrationRunner::Impl::portfolio_ends(std::int64_t start_index,
-                                                                   RegistrationResult& result) {
+std::vector<PortfolioEnd> Run::portfolio_ends() {
   std::size_t first = 0;
   std::vector<PortfolioEnd> ends;
   for (const ChainOptions& chain : options.chains) {
@@ -412,9 +352,9 @@ std::vector<PortfolioEnd> RegistrationRunner::Impl::portfolio_ends(std::int64_t 
     end.room_from_ct = chain.from_best_end ? ends.front().room_from_ct : start;
     end.chain = &chain;
     const int evaluations_before = result.evaluations;
-    run_chain(chain, begin, start_index, end, result);
+    run_chain(chain, begin, end);
     // Where nothing was searched, the start is no end.
-    if (result.evaluations > evaluations_before) end.similarity = judged(end.room_from_ct, result);
+    if (result.evaluations > evaluations_before) end.similarity = judged(end.room_from_ct);
     if (std::isfinite(end.similarity)) {
       const auto worse = std::find_if(ends.begin(), ends.end(), [&](const PortfolioEnd& other) {
         return other.similarity < end.similarity;
@@ -429,49 +369,45 @@ std::vector<PortfolioEnd> RegistrationRunner::Impl::portfolio_ends(std::int64_t 
 }
 
 template <typename Counts>
-double RegistrationRunner::Impl::nearest_mm(const PortfolioEnd& end,
-                                            std::span<const PortfolioEnd> others,
-                                            const Counts& counts) const {
+double Run::nearest_mm(const PortfolioEnd& end,
+                       std::span<const PortfolioEnd> others,
+                       const Counts& counts) const {
   double nearest = std::numeric_limits<double>::quiet_NaN();
-  if (problem->target_points_ct.empty()) return nearest;
+  if (problem.target_points_ct.empty()) return nearest;
   for (const PortfolioEnd& other : others)
     if (other.chain != end.chain && counts(other))
       nearest = std::fmin(
-          nearest, mean_tre_mm(end.room_from_ct, other.room_from_ct, problem->target_points_ct));
+          nearest, mean_tre_mm(end.room_from_ct, other.room_from_ct, problem.target_points_ct));
   return nearest;
 }
 
-bool RegistrationRunner::Impl::is_rival(std::span<const PortfolioEnd> ends, std::size_t i) const {
+bool Run::is_rival(std::span<const PortfolioEnd> ends, std::size_t i) const {
   return ends[i].similarity >= kRivalShare * ends.front().similarity &&
          nearest_mm(ends[i], ends.first(i), [](const PortfolioEnd&) { return true; }) >
              kRivalDistanceMm;
 }
 
-PortfolioEnd RegistrationRunner::Impl::finished(PortfolioEnd end,
-                                                std::int64_t start_index,
-                                                RegistrationResult& result) {
+PortfolioEnd Run::finished(PortfolioEnd end) {
   end.similarity = std::numeric_limits<double>::quiet_NaN();
-  run_finish(start_index, end, result);
+  run_finish(end);
   return end;
 }
 
-PortfolioEnd RegistrationRunner::Impl::finished_best(std::span<const PortfolioEnd> ends,
-                                                     std::int64_t start_index,
-                                                     RegistrationResult& result) {
+PortfolioEnd Run::finished_best(std::span<const PortfolioEnd> ends) {
   const auto own_value = [&](PortfolioEnd& end) {
     if (!is_converged(end.stop_reason) || end.stage + 1 != stages.size())
       return -std::numeric_limits<double>::infinity();
-    take_own_similarity(end, result);
+    take_own_similarity(end);
     return end.similarity;
   };
-  PortfolioEnd best = finished(ends.front(), start_index, result);
+  PortfolioEnd best = finished(ends.front());
   if (is_convincing(ends)) return best;
   std::optional<double> best_value;
   for (std::size_t i = 1; i < ends.size(); ++i) {
     if (!is_rival(ends, i)) continue;
     if (!best_value.has_value()) best_value = own_value(best);
     const std::size_t trace_size = result.trace.size();
-    PortfolioEnd rival = finished(ends[i], start_index, result);
+    PortfolioEnd rival = finished(ends[i]);
     const double value = own_value(rival);
     if (std::isfinite(value) && !(*best_value >= value)) {
       best = rival;
@@ -481,23 +417,35 @@ PortfolioEnd RegistrationRunner::Impl::finished_best(std::span<const PortfolioEn
     }
   }
   // A correction looks where the finish did.
-  if (best_value.has_value()) (void)stages[best.stage].narrow_to(*problem, best.room_from_ct);
+  if (best_value.has_value()) (void)stages[best.stage].narrow_to(problem, best.room_from_ct);
   return best;
 }
 
-void RegistrationRunner::Impl::run_portfolio(std::int64_t start_index, RegistrationResult& result) {
-  const std::vector<PortfolioEnd> ends = portfolio_ends(start_index, result);
+void Run::run_alone() {
+  const ChainOptions& chain = options.chains.front();
+  ChainEnd end{start};
+  if (run_chain(chain, 0, end)) run_finish(end);
+  correct(end);
+  take_own_similarity(end);
+  result.room_from_ct = end.room_from_ct;
+  result.similarity = end.similarity;
+  result.stop_reason = end.stop_reason;
+  result.pinned_along = end.pinned_along;
+  result.chain = chain.name;
+}
+
+void Run::run_portfolio() {
+  const std::vector<PortfolioEnd> ends = portfolio_ends();
   if (ends.empty()) return;
   const bool has_finish = !options.finish.stages.empty();
-  PortfolioEnd best = has_finish ? finished_best(ends, start_index, result) : ends.front();
+  PortfolioEnd best = has_finish ? finished_best(ends) : ends.front();
   result.chain = best.chain->name;
   const auto chosen = std::find_if(
       ends.begin(), ends.end(), [&](const PortfolioEnd& end) { return end.chain == best.chain; });
   result.chain_distance_mm = nearest_mm(
       *chosen, ends, [](const PortfolioEnd& other) { return !other.chain->from_best_end; });
-  correct(start_index, best, result);
-  if (has_finish || options.correction.is_wanted)
-    best.similarity = judged(best.room_from_ct, result);
+  correct(best);
+  if (has_finish || options.correction.is_wanted) best.similarity = judged(best.room_from_ct);
   result.similarity = best.similarity;
   result.room_from_ct = best.room_from_ct;
   result.pinned_along = best.pinned_along;
@@ -505,78 +453,91 @@ void RegistrationRunner::Impl::run_portfolio(std::int64_t start_index, Registrat
                                                                     : best.stop_reason;
 }
 
-RegistrationRunner::RegistrationRunner(std::shared_ptr<const RegistrationProblem> problem,
-                                       const RegistrationOptions& options,
-                                       std::shared_ptr<ThreadPool> pool)
-    : impl_(std::make_unique<Impl>()) {
+}  // namespace
+
+Registration::Registration(std::shared_ptr<const RegistrationProblem> of_problem,
+                           const RegistrationOptions& by_method,
+                           const std::shared_ptr<ThreadPool>& threads)
+    : problem(std::move(of_problem)), method(by_method) {
   check(problem != nullptr, "a registration needs a problem");
-  throw_if_any(problems(options));
+  throw_if_any(problems(method));
   throw_if_any(problems(*problem));
-  throw_if_any(correction_problems(*problem, options));
-  impl_->options = options;
-  impl_->pool = std::move(pool);
-  impl_->problem = std::move(problem);
-  impl_->prepare();
+  throw_if_any(correction_problems(*problem, method));
+  std::vector<StageOptions> all;
+  for (const ChainOptions& chain : method.chains)
+    all.insert(all.end(), chain.stages.begin(), chain.stages.end());
+  all.insert(all.end(), method.finish.stages.begin(), method.finish.stages.end());
+  const bool is_portfolio = method.chains.size() > 1;
+  if (is_portfolio) all.push_back(method.judge.stage);
+  stages = prepared_stages(*problem, all, threads);
+  if (is_portfolio) {
+    judge = std::move(stages.back());
+    stages.pop_back();
+  }
+  for (const RegistrationView& view : problem->views) views_.push_back(view.view);
+  step_points_ct_ = some_points(problem->scaling_points_ct);
 }
 
-RegistrationRunner::~RegistrationRunner() = default;
-RegistrationRunner::RegistrationRunner(RegistrationRunner&&) noexcept = default;
-RegistrationRunner& RegistrationRunner::operator=(RegistrationRunner&&) noexcept = default;
+void Registration::examine_ends(const UncertaintyOptions& options,
+                                const std::shared_ptr<ThreadPool>& threads) {
+  examiner.emplace(*problem, method.silhouette_mm());
+  uncertainty.emplace(problem, method, options, threads);
+}
 
-RegistrationResult RegistrationRunner::run(const RigidTransform& start_room_from_ct,
-                                           std::int64_t start_index) {
+RegistrationResult Registration::search(const RigidTransform& start_room_from_ct,
+                                        std::int64_t start_index) {
   const Clock::time_point begin = Clock::now();
-  Impl& impl = *impl_;
-  RegistrationResult result;
+  const MultiViewObjective& limits = stages.front().objective;
+  const RigidTransform start = limits.nearest_within_limits(start_room_from_ct);
+  Run run{*problem,
+          method,
+          stages,
+          judge,
+          views_,
+          found_,
+          start_index,
+          start,
+          scaling_at(*problem, views_, start, step_points_ct_),
+          {}};
+  RegistrationResult& result = run.result;
   result.start_room_from_ct = start_room_from_ct;
   result.room_from_ct = start_room_from_ct;
   result.similarity = std::numeric_limits<double>::quiet_NaN();
-  const MultiViewObjective& limits = impl.stages.front().objective;
   result.clipped_along = parameter_names(limits.beyond_limits(start_room_from_ct));
-  impl.start = limits.nearest_within_limits(start_room_from_ct);
-  impl.at_start = impl.scaling_at(impl.start, impl.step_points_ct);
-  if (impl.judge.has_value()) {
-    impl.run_portfolio(start_index, result);
-  } else {
-    const ChainOptions& chain = impl.options.chains.front();
-    ChainEnd end{impl.start};
-    if (impl.run_chain(chain, 0, start_index, end, result))
-      impl.run_finish(start_index, end, result);
-    impl.correct(start_index, end, result);
-    impl.take_own_similarity(end, result);
-    result.room_from_ct = end.room_from_ct;
-    result.similarity = end.similarity;
-    result.stop_reason = end.stop_reason;
-    result.pinned_along = end.pinned_along;
-    result.chain = chain.name;
-  }
+  if (judge.has_value())
+    run.run_portfolio();
+  else
+    run.run_alone();
   result.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
-  return result;
+  return std::move(run.result);
 }
 
-ObjectiveValue RegistrationRunner::similarity_at(const RigidTransform& room_from_ct) {
-  return impl_->judge.has_value() ? impl_->judged(room_from_ct)
-                                  : similarity_at(room_from_ct, impl_->stages.size() - 1);
+RegistrationRecord Registration::run(const RigidTransform& start_room_from_ct,
+                                     std::int64_t start_index) {
+  RegistrationRecord record;
+  record.start_index = start_index;
+  record.result = search(start_room_from_ct, start_index);
+  if (!examiner) return record;
+  record.view_values = examiner->view_values(record.result.room_from_ct, uncertainty->is_on());
+  record.uncertainty = uncertainty->report(record.result, record.view_values);
+  return record;
 }
 
-ObjectiveValue RegistrationRunner::similarity_at(const RigidTransform& room_from_ct,
-                                                 std::size_t stage) {
-  MultiViewObjective* const objective = objective_at(room_from_ct, stage);
-  return objective == nullptr ? inadmissible_value() : objective->evaluate(room_from_ct);
+ObjectiveValue Registration::similarity_at(const RigidTransform& room_from_ct) {
+  return judge.has_value() ? value_of_judge(*judge, *problem, room_from_ct)
+                           : stages.back().value_at(*problem, room_from_ct);
 }
 
-MultiViewObjective* RegistrationRunner::objective_at(const RigidTransform& room_from_ct,
-                                                     std::size_t stage) {
-  check(stage < impl_->stages.size(), "no such stage");
-  PreparedStage& prepared = impl_->stages[stage];
-  return prepared.narrow_to(*impl_->problem, room_from_ct) ? &prepared.objective : nullptr;
+void diagnose(const std::shared_ptr<const RegistrationProblem>& problem,
+              RegistrationRecord& record) {
+  const RegistrationResult& result = record.result;
+  if (!record.view_values.empty() && result.evaluations > 0)
+    record.diagnosis =
+        diagnose_views(problem, result.start_room_from_ct, result.room_from_ct, record.view_values);
 }
 
-const RegistrationProblem& RegistrationRunner::problem() const {
-  return *impl_->problem;
-}
-const RegistrationOptions& RegistrationRunner::options() const {
-  return impl_->options;
+Judgement judgement_of(const RegistrationRecord& record) {
+  return judgement_of(record.result, record.view_values, record.diagnosis);
 }
 
 }  // namespace af::registration

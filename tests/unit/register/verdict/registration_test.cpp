@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "register/method/registration.h"
+#include "register/verdict/registration.h"
 
 #include <algorithm>
 #include <cmath>
@@ -62,23 +62,23 @@ TEST(Registration, TwoViewsRecoverAKnownPose) {
     options.use_similarity(similarity);
     // 1296 pixels per view are few for 64 x 64 bins.
     use_bins(24, options);
-    RegistrationRunner runner(small.problem, options);
+    Registration registration(small.problem, options);
     const RigidTransform start = start_near(small);
     ASSERT_GT(mean_distance_mm(start, small.gold_room_from_ct), 4.0);
-    const RegistrationResult result = runner.run(start);
+    const RegistrationResult result = registration.search(start);
     EXPECT_EQ(result.stop_reason, StopReason::StepBelowFinal);
     EXPECT_LT(mean_distance_mm(result.room_from_ct, small.gold_room_from_ct), kFinalStepErrorMm)
         << similarity;
     EXPECT_EQ(result.drr_count, 2 * result.evaluations);
     EXPECT_EQ(result.start_room_from_ct.matrix(), start.matrix());
-    EXPECT_EQ(result.similarity, runner.similarity_at(result.room_from_ct).similarity);
+    EXPECT_EQ(result.similarity, registration.similarity_at(result.room_from_ct).similarity);
   }
 }
 
 TEST(Registration, TheTraceTellsBothPasses) {
   const test::SmallCase small = test::small_case();
-  RegistrationRunner runner(small.problem, preset_options("paper"));
-  const RegistrationResult result = runner.run(start_near(small));
+  Registration registration(small.problem, preset_options("paper"));
+  const RegistrationResult result = registration.search(start_near(small));
   ASSERT_FALSE(result.trace.empty());
   EXPECT_EQ(result.trace.front().pass, 0);
   EXPECT_EQ(result.trace.front().step_mm, 5.0);
@@ -98,16 +98,16 @@ TEST(Registration, RepeatsAndThreadsGiveTheSameBits) {
   const test::SmallCase small = test::small_case();
   RegistrationOptions options = preset_options("paper");
   options.max_evaluations = 200;
-  RegistrationRunner runner(small.problem, options);
-  const RegistrationResult first = runner.run(start_near(small));
+  Registration registration(small.problem, options);
+  const RegistrationResult first = registration.search(start_near(small));
   EXPECT_EQ(first.stop_reason, StopReason::EvaluationBudgetSpent);
   EXPECT_EQ(first.evaluations, 200);
-  (void)runner.run(small.gold_room_from_ct);
-  const RegistrationResult again = runner.run(start_near(small));
+  (void)registration.search(small.gold_room_from_ct);
+  const RegistrationResult again = registration.search(start_near(small));
   RegistrationResult in_thread;
-  RegistrationRunner other(small.problem, options);
-  std::thread thread([&] { in_thread = other.run(start_near(small)); });
-  (void)runner.run(small.gold_room_from_ct);
+  Registration other(small.problem, options);
+  std::thread thread([&] { in_thread = other.search(start_near(small)); });
+  (void)registration.search(small.gold_room_from_ct);
   thread.join();
   for (const RegistrationResult* const result :
        std::initializer_list<const RegistrationResult*>{&again, &in_thread}) {
@@ -128,9 +128,9 @@ void keep_rays_of_nominal(const RegistrationProblem& problem,
 TEST(Registration, AStartWhoseRaysAFieldLacksIsReported) {
   const test::SmallCase small = test::small_case();
   keep_rays_of_nominal(*small.problem, small.problem->views);
-  RegistrationRunner runner(small.problem, preset_options("paper"));
+  Registration registration(small.problem, preset_options("paper"));
   const RigidTransform start = start_near(small);
-  const RegistrationResult result = runner.run(start);
+  const RegistrationResult result = registration.search(start);
   EXPECT_EQ(result.stop_reason, StopReason::StartInadmissible);
   EXPECT_EQ(result.room_from_ct.matrix(), start.matrix());
   EXPECT_TRUE(std::isnan(result.similarity));
@@ -142,11 +142,11 @@ TEST(Registration, AStartOutsideTheMotionRangeIsClippedIntoIt) {
   const test::SmallCase small = test::small_case();
   const MotionLimit limit{small.problem->frame(), {5.0 * kRadPerDeg, 4.0}};
   for (RegistrationView& view : small.problem->views) view.limit = limit;
-  RegistrationRunner runner(small.problem, two_stages("ncc", "gauss-newton"));
+  Registration registration(small.problem, two_stages("ncc", "gauss-newton"));
   const auto from = [&](const std::array<double, 6>& parameters) {
     const RigidTransform start =
         pose_from_parameters(limit.frame, PoseParameters::from_deg_and_mm(parameters));
-    const RegistrationResult result = runner.run(start);
+    const RegistrationResult result = registration.search(start);
     EXPECT_EQ(result.start_room_from_ct.matrix(), start.matrix());
     EXPECT_LT(mean_distance_mm(result.room_from_ct, small.gold_room_from_ct), kFinalStepErrorMm);
     return result;
@@ -164,8 +164,8 @@ TEST(Registration, AnEndAtTheLimitIsReportedAndStaysInside) {
   // The gold pose has |t| = 2.5 mm along x; the box ends at 1.5 mm.
   const MotionLimit limit{small.problem->frame(), {5.0 * kRadPerDeg, 1.5}};
   for (RegistrationView& view : small.problem->views) view.limit = limit;
-  RegistrationRunner runner(small.problem, preset_options("paper"));
-  const RegistrationResult result = runner.run(small.problem->nominal_room_from_ct);
+  Registration registration(small.problem, preset_options("paper"));
+  const RegistrationResult result = registration.search(small.problem->nominal_room_from_ct);
   EXPECT_EQ(result.stop_reason, StopReason::PinnedAtLimit);
   EXPECT_GT(result.inadmissible, 0);
   EXPECT_TRUE(limit.range.contains(parameters_from_pose(limit.frame, result.room_from_ct)));
@@ -178,8 +178,8 @@ TEST(Registration, EveryOptimizerSaysAlongWhatTheRangeEndsWhereItIsPinned) {
   limit.range.high.translation_mm.x() = 1.0;
   for (RegistrationView& view : small.problem->views) view.limit = limit;
   for (const std::string& optimizer : optimizer_names()) {
-    RegistrationRunner runner(small.problem, two_stages("ncc", optimizer));
-    const RegistrationResult result = runner.run(small.problem->nominal_room_from_ct);
+    Registration registration(small.problem, two_stages("ncc", optimizer));
+    const RegistrationResult result = registration.search(small.problem->nominal_room_from_ct);
     EXPECT_EQ(result.stop_reason, StopReason::PinnedAtLimit) << optimizer;
     EXPECT_EQ(result.pinned_along, "tx") << optimizer;
     EXPECT_TRUE(limit.beyond(result.room_from_ct).none()) << optimizer;
@@ -188,10 +188,10 @@ TEST(Registration, EveryOptimizerSaysAlongWhatTheRangeEndsWhereItIsPinned) {
 
 TEST(Registration, ACtFarFromTheRegionsIsReported) {
   const test::SmallCase small = test::small_case();
-  RegistrationRunner runner(small.problem, preset_options("paper"));
+  Registration registration(small.problem, preset_options("paper"));
   RigidTransform far_away = RigidTransform::Identity();
   far_away.translation() = Eigen::Vector3d(0, 0, 400);
-  EXPECT_EQ(runner.run(far_away).stop_reason, StopReason::CtOutsideRoi);
+  EXPECT_EQ(registration.search(far_away).stop_reason, StopReason::CtOutsideRoi);
 }
 
 TEST(Registration, AMaskedSpotDoesNotMoveTheResult) {
@@ -207,8 +207,8 @@ TEST(Registration, AMaskedSpotDoesNotMoveTheResult) {
     for (int row = 17; row < 27; ++row)
       for (int column = 23; column < 33; ++column) view.mask.at(column, row) = 0.0f;
   }
-  RegistrationRunner runner(small.problem, options);
-  const RegistrationResult result = runner.run(start_near(small));
+  Registration registration(small.problem, options);
+  const RegistrationResult result = registration.search(start_near(small));
   EXPECT_LT(mean_distance_mm(result.room_from_ct, small.gold_room_from_ct), kFinalStepErrorMm);
 }
 
@@ -219,7 +219,7 @@ TEST(RegistrationProblem, NamesEverythingThatIsWrong) {
   small.problem->views[1].mask = Image2d(2, 2);
   small.problem->scaling_points_ct.clear();
   try {
-    const RegistrationRunner runner(small.problem, preset_options("paper"));
+    const Registration registration(small.problem, preset_options("paper"));
     FAIL() << "must throw";
   } catch (const InputError& error) {
     const std::string message = error.what();
@@ -282,12 +282,12 @@ TEST(Registration, EveryOptimizerRecoversAKnownPose) {
                                                                     {"nelder-mead", "ncc"},
                                                                     {"cma-es", "ncc"}};
   for (const auto& [optimizer, similarity] : methods) {
-    RegistrationRunner runner(small.problem, two_stages(similarity, optimizer));
-    const RegistrationResult result = runner.run(start_near(small));
+    Registration registration(small.problem, two_stages(similarity, optimizer));
+    const RegistrationResult result = registration.search(start_near(small));
     EXPECT_EQ(result.stop_reason, StopReason::StepBelowFinal) << optimizer << ' ' << similarity;
     EXPECT_LT(mean_distance_mm(result.room_from_ct, small.gold_room_from_ct), kFinalStepErrorMm)
         << optimizer << ' ' << similarity;
-    EXPECT_EQ(result.similarity, runner.similarity_at(result.room_from_ct).similarity);
+    EXPECT_EQ(result.similarity, registration.similarity_at(result.room_from_ct).similarity);
     // Sums that come with derivatives are rounded otherwise.
     EXPECT_NEAR(result.similarity, result.trace.back().similarity, 1e-5);
   }
@@ -297,10 +297,10 @@ TEST(Registration, EveryMeasureIsBestNearTheKnownPose) {
   const test::SmallCase small = test::small_case();
   for (const std::string& similarity : similarity_names()) {
     RegistrationOptions options = two_stages(similarity, "best-neighbor");
-    RegistrationRunner runner(small.problem, options);
-    const double at_gold = runner.similarity_at(small.gold_room_from_ct).similarity;
-    EXPECT_GT(at_gold, runner.similarity_at(start_near(small)).similarity) << similarity;
-    const RegistrationResult result = runner.run(start_near(small));
+    Registration registration(small.problem, options);
+    const double at_gold = registration.similarity_at(small.gold_room_from_ct).similarity;
+    EXPECT_GT(at_gold, registration.similarity_at(start_near(small)).similarity) << similarity;
+    const RegistrationResult result = registration.search(start_near(small));
     EXPECT_LT(mean_distance_mm(result.room_from_ct, small.gold_room_from_ct),
               0.5 * mean_distance_mm(start_near(small), small.gold_room_from_ct))
         << similarity;
@@ -311,14 +311,16 @@ TEST(Registration, DrawnSearchesDependOnSeedAndStartIndexAlone) {
   const test::SmallCase small = test::small_case();
   RegistrationOptions options = two_stages("ncc", "cma-es");
   options.max_evaluations = 120;
-  RegistrationRunner runner(small.problem, options);
-  const RegistrationResult first = runner.run(start_near(small), 3);
-  (void)runner.run(start_near(small), 4);
-  EXPECT_EQ(runner.run(start_near(small), 3).room_from_ct.matrix(), first.room_from_ct.matrix());
-  EXPECT_NE(runner.run(start_near(small), 4).room_from_ct.matrix(), first.room_from_ct.matrix());
+  Registration registration(small.problem, options);
+  const RegistrationResult first = registration.search(start_near(small), 3);
+  (void)registration.search(start_near(small), 4);
+  EXPECT_EQ(registration.search(start_near(small), 3).room_from_ct.matrix(),
+            first.room_from_ct.matrix());
+  EXPECT_NE(registration.search(start_near(small), 4).room_from_ct.matrix(),
+            first.room_from_ct.matrix());
   options.seed = 2;
-  RegistrationRunner other(small.problem, options);
-  EXPECT_NE(other.run(start_near(small), 3).room_from_ct.matrix(), first.room_from_ct.matrix());
+  Registration other(small.problem, options);
+  EXPECT_NE(other.search(start_near(small), 3).room_from_ct.matrix(), first.room_from_ct.matrix());
 }
 
 /// With steps so small that it ends where it began.
@@ -337,14 +339,14 @@ TEST(Registration, APortfolioTakesTheChainThatItsJudgePrefers) {
   options.chains = {idle, good.chains[0], idle};
   options.judge.stage = StageOptions();
   options.judge.stage.similarity.name = "rg";
-  RegistrationRunner runner(small.problem, options);
-  const RegistrationResult result = runner.run(start_near(small));
+  Registration registration(small.problem, options);
+  const RegistrationResult result = registration.search(start_near(small));
   EXPECT_EQ(result.chain, "good");
   EXPECT_LT(mean_distance_mm(result.room_from_ct, small.gold_room_from_ct), kFinalStepErrorMm);
-  EXPECT_EQ(result.similarity, runner.similarity_at(result.room_from_ct).similarity);
+  EXPECT_EQ(result.similarity, registration.similarity_at(result.room_from_ct).similarity);
   // An end that explains nothing is said to.
   options.judge.least_value = 2.0;
-  EXPECT_EQ(RegistrationRunner(small.problem, options).run(start_near(small)).stop_reason,
+  EXPECT_EQ(Registration(small.problem, options).search(start_near(small)).stop_reason,
             StopReason::NoBetterThanNoDrr);
 }
 
@@ -359,15 +361,15 @@ TEST(Registration, APortfolioEndsAtTheFirstConvincingChain) {
   options.judge.enough_value = 2.0;  // never
   RegistrationOptions one = options;
   one.chains.pop_back();
-  const int alone = RegistrationRunner(small.problem, one).run(start_near(small)).evaluations;
-  RegistrationRunner all(small.problem, options);
-  const RegistrationResult both = all.run(start_near(small));
+  const int alone = Registration(small.problem, one).search(start_near(small)).evaluations;
+  Registration all(small.problem, options);
+  const RegistrationResult both = all.search(start_near(small));
   EXPECT_EQ(both.evaluations, 2 * alone);
   // Just convincing, and just not: the value at the end itself is enough.
   for (const bool is_convincing : {true, false}) {
     options.judge.enough_value = both.similarity + (is_convincing ? 0.0 : 1e-9);
-    RegistrationRunner runner(small.problem, options);
-    const RegistrationResult result = runner.run(start_near(small));
+    Registration registration(small.problem, options);
+    const RegistrationResult result = registration.search(start_near(small));
     EXPECT_EQ(result.evaluations, is_convincing ? alone : 2 * alone);
     EXPECT_EQ(result.chain, "first");
     EXPECT_EQ(result.room_from_ct.matrix(), both.room_from_ct.matrix());
@@ -384,7 +386,7 @@ TEST(Registration, ALastResortRunsOnlyWhereNothingWasFound) {
   options.judge.enough_value = 2.0;  // never
   const auto result_below = [&](double value) {
     options.chains.back().only_below = value;
-    return RegistrationRunner(small.problem, options).run(start_near(small));
+    return Registration(small.problem, options).search(start_near(small));
   };
   const RegistrationResult idle_alone = result_below(-1.0);
   EXPECT_EQ(idle_alone.chain, "idle");
@@ -407,9 +409,7 @@ TEST(Registration, AChainCanStartFromTheBestEndSoFar) {
   options.judge.stage = StageOptions();
   options.judge.stage.similarity.name = "rg";
   options.judge.enough_value = 2.0;  // never
-  const auto run = [&] {
-    return RegistrationRunner(small.problem, options).run(start_near(small));
-  };
+  const auto run = [&] { return Registration(small.problem, options).search(start_near(small)); };
   const auto last_pose_to_gold_mm = [&] {
     const PoseParameters last = run().trace.back().parameters;
     return mean_distance_mm(pose_from_parameters(small.problem->frame(), last),
@@ -429,8 +429,7 @@ TEST(Registration, AChainFromTheBestEndIsLeftOutWhereThereIsNone) {
   options.chains.back().from_best_end = true;
   options.judge.stage = StageOptions();
   options.judge.stage.similarity.name = "rg";
-  const RegistrationResult result =
-      RegistrationRunner(small.problem, options).run(start_near(small));
+  const RegistrationResult result = Registration(small.problem, options).search(start_near(small));
   EXPECT_EQ(result.stop_reason, StopReason::StartInadmissible);
   EXPECT_FALSE(result.has_pose());
 }
@@ -468,18 +467,18 @@ TEST(Registration, TheFinishChoosesAmongEndsThatTheJudgeHardlyTellsApart) {
     options.judge.enough_value = 2.0;  // never
     RegistrationOptions alone = options;
     alone.chains.pop_back();
-    EXPECT_LT(mean_distance_mm(RegistrationRunner(small.problem, alone).run(elsewhere).room_from_ct,
-                               gold),
-              1.0);
-    RegistrationRunner runner(small.problem, options);
-    const RegistrationResult result = runner.run(elsewhere);
-    const double share =
-        runner.similarity_at(gold).similarity / runner.similarity_at(elsewhere).similarity;
+    EXPECT_LT(
+        mean_distance_mm(Registration(small.problem, alone).search(elsewhere).room_from_ct, gold),
+        1.0);
+    Registration registration(small.problem, options);
+    const RegistrationResult result = registration.search(elsewhere);
+    const double share = registration.similarity_at(gold).similarity /
+                         registration.similarity_at(elsewhere).similarity;
     EXPECT_LT(share, is_near ? 1.0 : 0.88);
     EXPECT_GT(share, is_near ? 0.92 : 0.82);
     EXPECT_EQ(result.chain, is_near ? "middle" : "idle");
     EXPECT_LT(mean_distance_mm(result.room_from_ct, is_near ? gold : elsewhere), 0.6);
-    EXPECT_EQ(result.similarity, runner.similarity_at(result.room_from_ct).similarity);
+    EXPECT_EQ(result.similarity, registration.similarity_at(result.room_from_ct).similarity);
   }
 }
 
@@ -511,11 +510,10 @@ TEST(Registration, AnyNumberOfThreadsGivesTheSameBits) {
     SCOPED_TRACE(optimizer);
     RegistrationOptions options = two_stages(similarity, optimizer);
     options.max_evaluations = 60;
-    const RegistrationResult alone =
-        RegistrationRunner(small.problem, options).run(start_near(small));
+    const RegistrationResult alone = Registration(small.problem, options).search(start_near(small));
     for (const int threads : {2, 5}) {
-      RegistrationRunner runner(small.problem, options, std::make_shared<ThreadPool>(threads));
-      expect_same(runner.run(start_near(small)), alone);
+      Registration registration(small.problem, options, std::make_shared<ThreadPool>(threads));
+      expect_same(registration.search(start_near(small)), alone);
     }
   }
 }
@@ -525,11 +523,10 @@ TEST(Registration, ThreadsAgreeWhereTheMotionRangeEnds) {
   const MotionLimit limit{small.problem->frame(), {5.0 * kRadPerDeg, 4.2}};
   for (RegistrationView& view : small.problem->views) view.limit = limit;
   RegistrationOptions options = two_stages("ncc", "best-neighbor");
-  const RegistrationResult alone =
-      RegistrationRunner(small.problem, options).run(start_near(small));
+  const RegistrationResult alone = Registration(small.problem, options).search(start_near(small));
   EXPECT_GT(alone.inadmissible, 0);
-  RegistrationRunner runner(small.problem, options, std::make_shared<ThreadPool>(3));
-  expect_same(runner.run(start_near(small)), alone);
+  Registration registration(small.problem, options, std::make_shared<ThreadPool>(3));
+  expect_same(registration.search(start_near(small)), alone);
 }
 
 TEST(Registration, TheFinishFollowsTheBestEndOnly) {
@@ -539,10 +536,9 @@ TEST(Registration, TheFinishFollowsTheBestEndOnly) {
   rough.stages[0].search.final_step_mm = 1.0;
   const ChainOptions finish{"finish", {options.chains[0].stages[1]}};
   options.chains = {rough};
-  const int alone = RegistrationRunner(small.problem, options).run(start_near(small)).evaluations;
+  const int alone = Registration(small.problem, options).search(start_near(small)).evaluations;
   options.finish = finish;
-  const RegistrationResult chain =
-      RegistrationRunner(small.problem, options).run(start_near(small));
+  const RegistrationResult chain = Registration(small.problem, options).search(start_near(small));
   EXPECT_GT(chain.evaluations, alone);
   EXPECT_LT(mean_distance_mm(chain.room_from_ct, small.gold_room_from_ct), kFinalStepErrorMm);
   // A portfolio of the same chain twice pays for it twice, and once for the finish.
@@ -550,24 +546,24 @@ TEST(Registration, TheFinishFollowsTheBestEndOnly) {
   options.judge.stage = StageOptions();
   options.judge.stage.similarity.name = "rg";
   options.judge.enough_value = 2.0;  // never
-  RegistrationRunner runner(small.problem, options);
-  const RegistrationResult portfolio = runner.run(start_near(small));
+  Registration registration(small.problem, options);
+  const RegistrationResult portfolio = registration.search(start_near(small));
   EXPECT_EQ(portfolio.evaluations, chain.evaluations + alone);
   EXPECT_EQ(portfolio.room_from_ct.matrix(), chain.room_from_ct.matrix());
-  EXPECT_EQ(portfolio.similarity, runner.similarity_at(portfolio.room_from_ct).similarity);
+  EXPECT_EQ(portfolio.similarity, registration.similarity_at(portfolio.room_from_ct).similarity);
 }
 
 TEST(Registration, AStageOfAMissingLevelIsRefused) {
   const test::SmallCase small = test::small_case();
-  EXPECT_THROW(RegistrationRunner(small.problem, preset_options("fast")), InputError);
+  EXPECT_THROW(Registration(small.problem, preset_options("fast")), InputError);
 }
 
 TEST(Registration, GaussNewtonStaysInsideTheMotionRange) {
   const test::SmallCase small = test::small_case();
   const MotionLimit limit{small.problem->frame(), {5.0 * kRadPerDeg, 1.5}};
   for (RegistrationView& view : small.problem->views) view.limit = limit;
-  RegistrationRunner runner(small.problem, two_stages("ncc", "gauss-newton"));
-  const RegistrationResult result = runner.run(small.problem->nominal_room_from_ct);
+  Registration registration(small.problem, two_stages("ncc", "gauss-newton"));
+  const RegistrationResult result = registration.search(small.problem->nominal_room_from_ct);
   const PoseParameters end = parameters_from_pose(limit.frame, result.room_from_ct);
   EXPECT_TRUE(limit.range.contains(end));
   // The gold pose is at 2.5 mm along x: the search goes to the wall and along it.
@@ -594,14 +590,14 @@ ParameterScaling some_scaling() {
 TEST(PoseTarget, DerivativesAreThoseOfItsValue) {
   const test::SmallCase small = test::small_case();
   for (const char* similarity : {"ncc", "gc", "rg", "ssd", "tncc"}) {
-    RegistrationRunner runner(small.problem, two_stages(similarity, "gauss-newton"));
-    const RegistrationProblem& problem = runner.problem();
+    Registration registration(small.problem, two_stages(similarity, "gauss-newton"));
+    const RegistrationProblem& problem = *registration.problem;
     MultiViewObjective objective = objective_of(problem, similarity);
     PoseTarget target(
         objective, PoseFrame::about(start_near(small), problem.center_ct_mm), some_scaling());
     ScaledParameters point;
     point << 1.0, -0.7, 0.5, 0.3, -0.2, 0.4;
-    const auto with = target.evaluate_with(point, Derivatives::NormalEquations);
+    const auto with = target.evaluate_with_normal_equations(point);
     ASSERT_TRUE(with.has_value());
     for (int k = 0; k < 6; ++k) {
       // The renderer's own derivatives are differences over 1e-3 rad and 0.1 mm.
@@ -625,7 +621,7 @@ TEST(PoseTarget, BoundsTheCurvatureOfReweightedResidualsByTheirNormalEquations) 
   const ParameterScaling scaling = some_scaling();
   const PoseFrame frame = PoseFrame::about(start_near(small), small.problem->center_ct_mm);
   PoseTarget target(objective, frame, scaling);
-  const auto with = target.evaluate_with(ScaledParameters::Zero(), Derivatives::NormalEquations);
+  const auto with = target.evaluate_with_normal_equations(ScaledParameters::Zero());
   ASSERT_TRUE(with.has_value());
   NormalEquations equations;
   objective.evaluate_with(

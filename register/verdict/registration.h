@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+// A registration, whole: what af-register, af-evaluate and the library do from a start to what is
+// said of its end.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "base/thread_pool.h"
+#include "register/method/prepared_stage.h"
+#include "register/method/registration_result.h"
+#include "register/verdict/pose_examiner.h"
+#include "register/verdict/uncertainty_estimator.h"
+#include "register/verdict/view_diagnosis.h"
+
+namespace af::registration {
+
+/// Distances of a registration's start and end from the gold pose.
+struct TargetErrors {
+  std::string gold_source;  ///< "fiducials" or "study" (its gold_room_from_ct)
+  double initial_tre_mm = 0.0;
+  double tre_mm = 0.0;
+};
+
+/// One registration, and what is said of its end.
+struct RegistrationRecord {
+  std::int64_t start_index = 0;
+  RegistrationResult result;
+  std::vector<ViewValue> view_values;  ///< of PoseExaminer, at the end
+  UncertaintyReport uncertainty;       ///< of UncertaintyEstimator, likewise
+  ViewDiagnosis diagnosis;             ///< where X-rays were looked into: diagnose()
+  std::optional<TargetErrors> errors;  ///< when the gold pose is known
+
+  /// What the registration itself found; the rest is derived from it.
+  auto members() { return std::tie(start_index, result, view_values, uncertainty); }
+};
+
+/// Registers one case from any number of starts. Construction does what all starts share (smoothed
+/// and decimated references, histograms' ranges, X-ray bins); runs reuse the buffers. One run at a
+/// time spreads over the threads of a pool: views, and poses that do not depend on each other. Runs
+/// at the same time need a registration each. A result depends on problem, method and start alone
+/// (its seconds excepted), not on the number of threads. The DRR range of a case is that of the DRR
+/// at the nominal pose over the region of interest grown by half its size to every side. \test
+/// Registration.TwoViewsRecoverAKnownPose
+class Registration {
+ public:
+  /// InputError when method or problem have problems, or when the nominal pose is outside a field.
+  /// `threads`: none means the calling thread alone.
+  Registration(std::shared_ptr<const RegistrationProblem> of_problem,
+               const RegistrationOptions& by_method,
+               const std::shared_ptr<ThreadPool>& threads = nullptr);
+
+  /// Lets run() examine ends: else records have neither view_values nor uncertainty.
+  void examine_ends(const UncertaintyOptions& options,
+                    const std::shared_ptr<ThreadPool>& threads = nullptr);
+
+  // The parts, in the order in which a start meets them.
+
+  std::shared_ptr<const RegistrationProblem> problem;  ///< X-rays, cameras, renderers
+  RegistrationOptions method;                          ///< chains of stages, finish, judge
+  /// Of all chains and the finish, in this order: each an objective (renderers and measures of its
+  /// views) and the optimiser that searches it.
+  std::vector<PreparedStage> stages;
+  std::optional<PreparedStage> judge;               ///< chooses among the ends of a portfolio
+  std::optional<PoseExaminer> examiner;             ///< values the end view by view
+  std::optional<UncertaintyEstimator> uncertainty;  ///< how far the end may be from the truth
+
+  /// From a start to its end: chain by chain, stage by stage, the choice among their ends, the
+  /// finish, the correction. `start_index` is a key of random numbers.
+  [[nodiscard]] RegistrationResult search(const RigidTransform& start_room_from_ct,
+                                          std::int64_t start_index = 0);
+  /// search(), and what examiner and uncertainty say of its end.
+  [[nodiscard]] RegistrationRecord run(const RigidTransform& start_room_from_ct,
+                                       std::int64_t start_index = 0);
+
+  /// The value of RegistrationResult::similarity at a pose.
+  [[nodiscard]] ObjectiveValue similarity_at(const RigidTransform& room_from_ct);
+
+ private:
+  std::vector<View> views_;
+  std::vector<Eigen::Vector3d> step_points_ct_;
+  OptimizerResult found_;  ///< reused
+};
+
+/// Looks into X-rays that do not fit the end (diagnose_views()).
+void diagnose(const std::shared_ptr<const RegistrationProblem>& problem,
+              RegistrationRecord& record);
+
+/// The verdict on a record: at least doubtful where the diagnosis found something.
+Judgement judgement_of(const RegistrationRecord& record);
+
+}  // namespace af::registration
