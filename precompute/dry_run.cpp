@@ -16,6 +16,7 @@
 #include "precompute/casting/casters.h"
 #include "precompute/design/quantisation_probe.h"
 #include "precompute/formatted_text.h"
+#include "ranks/root_only.h"
 
 namespace af {
 
@@ -295,8 +296,7 @@ void print_dry_run(const SizedField& field, const FieldCaster& caster, const Pre
   const PlanOptions plan = field.unit_plan(ranks);
   std::vector<WorkUnit> units = plan_units(field.lattice, plan);
   const MemoryPlan memory = memory_plan(field, units, run);
-  all_or_none(run.world, [&] {
-    if (!run.world.is_root()) return;
+  do_on_root(run.world, [&] {
     // The units that are cast to measure the speed.
     const PlanOptions small = caster_named(field.options.caster).sample;
     const PlanOptions sample = small.rays_per_unit < plan.rays_per_unit ? small : plan;

@@ -15,6 +15,7 @@
 #include "precompute/build_record.h"
 #include "precompute/formatted_text.h"
 #include "ranks/progress_printer.h"
+#include "ranks/root_only.h"
 #include "ranks/terminal.h"
 
 namespace af {
@@ -79,9 +80,7 @@ FieldProvenance provenance_of(const BuildRecord& record,
 void remove_progress(UnitStore& progress, const PrecomputeRun& run) {
   progress.close();
   run.world.barrier();
-  all_or_none(run.world, [&] {
-    if (run.world.is_root()) run.folder.finish();
-  });
+  do_on_root(run.world, [&] { run.folder.finish(); });
 }
 
 void report(const BuildRecord& record,
@@ -107,14 +106,12 @@ MpiIoHints mpi_io_hints(const PrecomputeOptions& options) {
 }
 
 void open_output(const PrecomputeOptions& options, PrecomputeRun& run) {
-  all_or_none(run.world, [&] {
-    if (run.world.is_root() && std::filesystem::is_directory(options.output))
+  do_on_root(run.world, [&] {
+    if (std::filesystem::is_directory(options.output))
       throw FileError(options.output, "is a folder, not a field file");
   });
   run.folder.open();
-  all_or_none(run.world, [&] {
-    if (run.world.is_root()) announce_field(options.output);
-  });
+  do_on_root(run.world, [&] { announce_field(options.output); });
   check_parallel_writing(options.output, run.world, mpi_io_hints(options));
 }
 

@@ -12,6 +12,7 @@
 #include "precompute/casting/joined_caster.h"
 #include "precompute/casting/least_squares_caster.h"
 #include "precompute/casting/unit_costs.h"
+#include "ranks/root_only.h"
 #include "study/rig_file.h"
 #include "study/shared_inputs.h"
 
@@ -71,10 +72,7 @@ std::vector<FieldPart> parts_of_orbit(const FieldSource& source,
                                       const PrecomputeOptions& options,
                                       const Communicator& communicator) {
   std::vector<PartKey> keys =
-      all_or_none(communicator, [&] { return keys_of_orbit(source, options); });
-  std::vector<std::byte> bytes = bytes_of(keys);
-  communicator.broadcast(bytes);
-  keys = value_of<std::vector<PartKey>>(bytes, "the orbit of rank 0");
+      on_root(communicator, [&] { return keys_of_orbit(source, options); }).share().take();
   std::vector<FieldPart> parts;
   for (PartKey& key : keys) {
     FieldPart part{source, key.range, {}, {}};
