@@ -207,13 +207,13 @@ ProgressJournal::ProgressJournal(const UnfinishedWork& work)
     fs::remove_all(files_.folder);
   make_folder(files_.folder);
   try {
-    open(work);
+    go_on_or_begin(work);
   } catch (const fs::filesystem_error& error) {
     throw FileError(files_.folder.string(), error.what());
   }
 }
 
-void ProgressJournal::open(const UnfinishedWork& work) {
+void ProgressJournal::go_on_or_begin(const UnfinishedWork& work) {
   const bool goes_on = !work.restarts && is_there(files_.manifest()) && takes_over(work);
   fs::remove_all(refused_path(files_));
   if (goes_on) {

@@ -101,7 +101,7 @@ class ProgressJournal {
   void give_way() const;
 
  private:
-  void open(const UnfinishedWork& work);
+  void go_on_or_begin(const UnfinishedWork& work);
   bool takes_over(const UnfinishedWork& work);
 
   JournalFiles files_;
