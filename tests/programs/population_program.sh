@@ -84,7 +84,7 @@ awk -F, -v OFS=, 'NR == 1 { for (i = 1; i <= NF; ++i) if ($i == "mrpd_mm") mrpd 
 for line in '    InflationRow{"gc", Evidence::OneView, ' 'constexpr Confidence kOneView{'; do
   grep -q "^$line" fitted || fail "uncertainty.py of one view fitted $(cat fitted)"
 done
-python3 - "$root/register/uncertainty/calibration.cpp" kOverRegions pop/runs/clean-2-fast/spine-001/registrations.csv \
+python3 - "$root/register/verdict/calibration.cpp" kOverRegions pop/runs/clean-2-fast/spine-001/registrations.csv \
   kOneView pop/runs/clean-1-fast/spine-001/registrations.csv \
   kInSilhouettes bones/runs/clean-2-bone/bone-001/registrations.csv <<'PYTHON' || fail "uncertainty.py differs from calibration.cpp"
 import csv, re, sys
