@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// HDF5 handles that close themselves, and checked calls. For sources of
-// common/field_file alone.
+// HDF5 handles that close themselves, and checked calls. For sources of common/field alone.
 #pragma once
 
 #include <atomic>
