@@ -67,13 +67,16 @@ FieldProvenance provenance_of(const BuildRecord& record,
                            {{source.ct_path, source.ct}}};
   if (source.projections != nullptr)
     provenance.inputs[source.projections->path] = source.projections->content_sha256;
-  nlohmann::json json = to_json(provenance);
+  nlohmann::json record_json = to_json(provenance);
   if (source.projections != nullptr)
-    json["projections"] = {{"views", source.projections->views.size()},
-                           {"measured_rms", source.projections->measured_rms},
-                           {"residual_rms", source.projections->residual_rms}};
-  add_record(record, json);
-  return {std::string(program_version()), run.command_line, provenance.options_toml, json.dump(2)};
+    record_json["projections"] = {{"views", source.projections->views.size()},
+                                  {"measured_rms", source.projections->measured_rms},
+                                  {"residual_rms", source.projections->residual_rms}};
+  add_record(record, record_json);
+  return {std::string(program_version()),
+          run.command_line,
+          provenance.options_toml,
+          record_json.dump(2)};
 }
 
 /// Collective. On NFS a folder cannot be removed while a rank has a file of it open.

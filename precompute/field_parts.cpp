@@ -28,16 +28,7 @@ struct PartKey {
   MotionRange sized_for;
   std::vector<HalfSpace> sources;
   auto members() {
-    return std::tie(camera.name,
-                    camera.source_point,
-                    camera.detector_origin_point,
-                    camera.column_direction,
-                    camera.row_direction,
-                    range.low,
-                    range.high,
-                    sized_for.low,
-                    sized_for.high,
-                    sources);
+    return std::tie(camera, range.low, range.high, sized_for.low, sized_for.high, sources);
   }
 };
 

@@ -87,7 +87,7 @@ void add_ct(const CtGrid& ct, const RigidTransform& room_from_ct, RoomScene& sce
 
 PicturePanel panel_of(const RoomScene& scene, const Projection& projection) {
   constexpr int kSide = 420;
-  constexpr double kMargin = 46.0;
+  constexpr double kBorder = 46.0;
   const auto flat = [&](const Vector3d& point) {
     return Vector2d(point.dot(projection.right), -point.dot(projection.up));
   };
@@ -99,7 +99,7 @@ PicturePanel panel_of(const RoomScene& scene, const Projection& projection) {
       low = low.cwiseMin(flat(point));
       high = high.cwiseMax(flat(point));
     }
-  const double scale = (kSide - 2.0 * kMargin) / std::max((high - low).maxCoeff(), 1.0);
+  const double scale = (kSide - 2.0 * kBorder) / std::max((high - low).maxCoeff(), 1.0);
   const Vector2d middle = (low + high) / 2.0;
   const auto placed = [&](const Vector3d& point) {
     const Vector2d place = scale * (flat(point) - middle) + Vector2d::Constant(kSide / 2.0);

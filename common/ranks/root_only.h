@@ -68,7 +68,10 @@ class [[nodiscard]] RootOnly {
   /// What `use` makes of the value, on rank 0 again; a failure is handed on.
   template <typename Use>
   auto then(Use&& use) const {
-    return on_root(communicator_, [&] { return use(value()); });
+    return on_root(communicator_, [&] {
+      if (!value_) throw_failure(failure_);
+      return use(*value_);
+    });
   }
 
   /// Collective. Itself, once every rank knows that there is a value; otherwise every rank throws
@@ -81,17 +84,23 @@ class [[nodiscard]] RootOnly {
   /// Collective. The value on every rank, sent by bytes_of(), so that it keeps every bit; otherwise
   /// as confirmed(). \test RootOnly.AValueThatIsSharedIsEqualOnEveryRank
   Shared<T> share() && {
-    throw_if_failed();
+    RootOnly<std::vector<std::byte>> sent = then([&](const T& value) {
+      return communicator_.size() > 1 ? bytes_of(value) : std::vector<std::byte>();
+    });
+    sent.throw_if_failed();
     if (communicator_.size() > 1) {
       std::vector<std::byte> bytes;
-      if (communicator_.is_root()) bytes = bytes_of(*value_);
+      if (communicator_.is_root()) bytes = std::move(sent.value());
       communicator_.broadcast(bytes);
-      if (!communicator_.is_root()) value_ = value_of<T>(bytes, "what rank 0 shares");
+      all_or_none(communicator_, [&] {
+        if (!communicator_.is_root()) value_ = value_of<T>(bytes, "what rank 0 shares");
+      });
     }
     return Shared<T>(std::move(*value_));
   }
 
-  /// On rank 0, or its failure is thrown. A defect of the caller elsewhere (check()).
+  /// On rank 0, once it is confirmed. A defect of the caller (check()) elsewhere and before: there
+  /// rank 0 alone would throw.
   /// \test RootOnly.CanBeReadOnRankZeroAlone
   [[nodiscard]] const T& value() const {
     require_value();
@@ -103,9 +112,12 @@ class [[nodiscard]] RootOnly {
   }
 
  private:
+  template <typename Other>
+  friend class RootOnly;
+
   void require_value() const {
     check(communicator_.is_root(), "a value of rank 0 is read there alone");
-    if (!value_) throw_failure(failure_);
+    check(value_.has_value(), "a value of rank 0 is read once it is known to be there");
   }
   void throw_if_failed() const {
     const RankFailure failure = first_failure(communicator_, failure_);

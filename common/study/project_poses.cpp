@@ -153,10 +153,10 @@ bool is_json_pose(const PoseFileBytes& file) {
 
 PosesInFile read_json_pose(const PoseFileBytes& file, const PoseContext& /*context*/) {
   const std::string name = file.path.string();
-  const nlohmann::json json = json_of_text(file.bytes, name);
-  if (!json.contains(kPoseKey)) throw InputError(name + ": has no \"" + kPoseKey + "\"");
-  return {{{1, pose_of_rows(json[kPoseKey], name + ": " + kPoseKey)}},
-          notes_on(unread_keys(json), name)};
+  const nlohmann::json pose = json_of_text(file.bytes, name);
+  if (!pose.contains(kPoseKey)) throw InputError(name + ": has no \"" + kPoseKey + "\"");
+  return {{{1, pose_of_rows(pose[kPoseKey], name + ": " + kPoseKey)}},
+          notes_on(unread_keys(pose), name)};
 }
 
 bool is_toml_pose(const PoseFileBytes& file) {

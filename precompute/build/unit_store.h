@@ -25,7 +25,7 @@ class UnitStore {
 
   /// Of the run that began the work.
   [[nodiscard]] std::int64_t rays_per_unit() const { return store_.unit_size(); }
-  /// Rank 0: whether unfinished work was discarded because its options, other than these, were
+  /// Whether unfinished work was discarded because its options, other than these, were
   /// refused.
   [[nodiscard]] bool has_replaced_refused() const { return store_.has_replaced(); }
 

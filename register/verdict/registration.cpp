@@ -480,8 +480,8 @@ Registration::Registration(std::shared_ptr<const RegistrationProblem> of_problem
 
 void Registration::examine_ends(const UncertaintyOptions& options,
                                 const std::shared_ptr<ThreadPool>& threads) {
-  examiner.emplace(*problem, method.silhouette_mm());
   uncertainty.emplace(problem, method, options, threads);
+  examiner.emplace(*problem, method.silhouette_mm());
 }
 
 RegistrationResult Registration::search(const RigidTransform& start_room_from_ct,

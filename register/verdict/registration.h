@@ -58,7 +58,8 @@ class Registration {
   void examine_ends(const UncertaintyOptions& options,
                     const std::shared_ptr<ThreadPool>& threads = nullptr);
 
-  // The parts, in the order in which a start meets them.
+  // The parts, in the order in which a start meets them. They are made for each other: read them,
+  // but assign none.
 
   std::shared_ptr<const RegistrationProblem> problem;  ///< X-rays, cameras, renderers
   RegistrationOptions method;                          ///< chains of stages, finish, judge

@@ -243,11 +243,11 @@ TEST(PerturbedStarts, WithinRangeLieInsideByDesign) {
                 mean_tre_mm(start.room_from_ct, frame.gold_room_from_ct, points),
                 1e-9);
     EXPECT_EQ(start.interval, static_cast<int>(start.initial_tre_mm / 2.0));
-    constexpr double kRoundingMm = 1e-9;
+    constexpr double kSumRoundingMm = 1e-9;
     EXPECT_LT(
         mean_tre_mm(
             start.room_from_ct, pose_from_parameters(frame.pose_frame(), start.parameters), points),
-        kRoundingMm);
+        kSumRoundingMm);
   }
   for (int interval = 0; interval < 8; ++interval) EXPECT_EQ(per_interval[interval], 20);
   EXPECT_EQ(result.draws, 160u + result.inadmissible_draws);

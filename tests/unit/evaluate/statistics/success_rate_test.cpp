@@ -34,9 +34,9 @@ TEST(WilsonInterval, EqualsPublishedValues) {
 TEST(WilsonInterval, IsSymmetricUnderSwappingSuccessAndFailure) {
   const ProportionInterval a = wilson_interval(3, 17);
   const ProportionInterval b = wilson_interval(14, 17);
-  constexpr double kRounding = 1e-14;
-  EXPECT_NEAR(a.low, 1.0 - b.high, kRounding);
-  EXPECT_NEAR(a.high, 1.0 - b.low, kRounding);
+  constexpr double kMirrorRounding = 1e-14;
+  EXPECT_NEAR(a.low, 1.0 - b.high, kMirrorRounding);
+  EXPECT_NEAR(a.high, 1.0 - b.low, kMirrorRounding);
 }
 
 TEST(WilsonInterval, EndsExactlyAtZeroAndOne) {
