@@ -57,7 +57,7 @@ class Descriptor {
       if (errno != EINTR) throw FileError(path_, because("cannot be read", errno));
     }
   }
-  void sync() const {
+  void flush_to_disk() const {
     // Some file systems cannot sync a folder and say EINVAL: nothing more can be done there.
     if (fsync(number_) != 0 && errno != EINVAL)
       throw FileError(path_, because("cannot be synced to disk", errno));
@@ -217,7 +217,7 @@ void write_text_in_parts(const std::filesystem::path& path,
 
 void sync_path(const fs::path& path) {
   Descriptor descriptor(path, O_RDONLY);
-  descriptor.sync();
+  descriptor.flush_to_disk();
   descriptor.close();
 }
 
