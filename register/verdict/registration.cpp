@@ -118,7 +118,7 @@ struct Run {
   std::optional<PreparedStage>& judge;
   const std::vector<View>& views;
   OptimizerResult& search;  ///< of the stage that was searched last
-  std::int64_t start_index;
+  std::int64_t start_index = 0;
   RigidTransform start;                      ///< within the motion range
   std::optional<ParameterScaling> at_start;  ///< by some of the points, there
   RegistrationResult result;
