@@ -86,14 +86,7 @@ AttenuationVolume::AttenuationVolume(const CtGrid& bordered_grid,
 }
 
 std::array<Eigen::Vector3d, 8> AttenuationVolume::corner_points() const {
-  std::array<Eigen::Vector3d, 8> corners;
-  for (unsigned corner = 0; corner < 8; ++corner) {
-    Eigen::Vector3d index;
-    for (unsigned axis = 0; axis < 3; ++axis)
-      index[axis] = (corner >> axis & 1u) != 0 ? grid_.size[axis] - 1 : 0;
-    corners[corner] = grid_.point_mm(index);
-  }
-  return corners;
+  return corners_mm(grid_);
 }
 
 double AttenuationVolume::max_total_attenuation() const {
