@@ -7,7 +7,6 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
-#include <sys/resource.h>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -91,11 +90,19 @@ class Faults : public testing::Test {
     EXPECT_FALSE(fs::exists(field().string() + ".lock"));
   }
 
-  /// Files of these processes may not grow beyond `bytes` from now on: a full disk.
-  static void limit_files(const std::vector<pid_t>& processes, rlim_t bytes) {
-    const rlimit limit{bytes, bytes};
-    for (const pid_t process : processes)
-      EXPECT_EQ(prlimit(process, RLIMIT_FSIZE, &limit, nullptr), 0);
+  /// `command` on a disk that is full: no file of a rank may grow beyond `bytes`. Segments of
+  /// shared memory are such files, so that messages take the network.
+  static std::vector<std::string> on_full_disk(std::vector<std::string> command,
+                                               std::uint64_t bytes) {
+    const auto insert_at = [&](const std::string& word, int after, std::vector<std::string> words) {
+      const auto found = std::find(command.begin(), command.end(), word);
+      ASSERT_NE(found, command.end());
+      command.insert(found + after, words.begin(), words.end());
+    };
+    insert_at(
+        AF_PROGRAM_FOLDER "/af-precompute", 0, {"prlimit", "--fsize=" + std::to_string(bytes)});
+    insert_at(AF_MPIEXEC, 1, {"--mca", "btl", "self,tcp"});
+    return command;
   }
 
   static std::size_t count_of(const std::string& part, const std::string& text) {
@@ -164,9 +171,7 @@ TEST_F(Faults, ARankThatIsStoppedWhileOthersEndDoesNotKeepTheJob) {
 }
 
 TEST_F(Faults, AFullDiskWhileCastingNamesTheUnit) {
-  test::LaunchedJob job(precompute(kRanks), output());
-  ASSERT_TRUE(job.wait_until([] { return unit_bytes() > 0; }));
-  limit_files(job.ranks(), 300'000);
+  test::LaunchedJob job(on_full_disk(precompute(kRanks), 300'000), output());
   EXPECT_EQ(job.wait(kEndsWithin), 4) << said();
   EXPECT_THAT(said(),
               ContainsRegex("rank [0-9] on .*: casting unit .*records: cannot be written: File too "
@@ -177,10 +182,10 @@ TEST_F(Faults, AFullDiskWhileCastingNamesTheUnit) {
 TEST_F(Faults, AFullDiskWhileTheFieldIsWrittenEndsTheJobAtOnce) {
   // Ranks within a collective write of which one fails would wait for ever.
   for (const int ranks : {1, kRanks}) {
-    test::LaunchedJob job(precompute(ranks, {"--no-checkpoint"}), output());
-    // Said after casting: training still follows.
-    ASSERT_TRUE(job.wait_until([] { return said().find("tiles: ") != std::string::npos; }));
-    limit_files(job.ranks(), 400'000);  // more than the deflated codebook has
+    constexpr std::uint64_t kMoreThanTheDeflatedCodebook = 400'000;
+    test::LaunchedJob job(
+        on_full_disk(precompute(ranks, {"--no-checkpoint"}), kMoreThanTheDeflatedCodebook),
+        output());
     EXPECT_EQ(job.wait(kEndsWithin), 4) << said();
     EXPECT_THAT(said(),
                 ContainsRegex("writing round 1 of the indices: .*partial: H5Dwrite failed"));
