@@ -27,11 +27,13 @@ namespace {
 /// of the paper's field of a head or a spine.
 constexpr double kAssumedNodeMm = 1.0;
 
-/// Collective. The same CT, its attenuation blurred by sigma_mm, held once per node.
+/// Collective. The same CT, its attenuation, which is blurred by already_mm, blurred by sigma_mm;
+/// held once per node.
 std::shared_ptr<const AttenuationVolume> blurred_per_node(const AttenuationVolume& volume,
                                                           double sigma_mm,
+                                                          double already_mm,
                                                           const Communicator& communicator) {
-  const VolumeBlur blur(volume.grid(), sigma_mm);
+  const VolumeBlur blur(volume.grid(), sigma_mm, already_mm);
   return volume_per_node(
       blur.grid(),
       volume.model(),
@@ -40,24 +42,10 @@ std::shared_ptr<const AttenuationVolume> blurred_per_node(const AttenuationVolum
       communicator);
 }
 
-/// Parts of a rank's share of a level, one thread's work each. The same on every rank, however many
-/// threads these have.
-constexpr int kPartsPerRank = 8;
-
-/// Collective: memory that the ranks of a node share and fill together, each on its threads.
-FieldLevelMemory node_memory(const Communicator& communicator, ThreadPool& pool) {
-  return [communicator, &pool](std::size_t count, const FieldLevelFill& fill) {
-    const auto samples_of = [count](const std::byte* bytes) {
-      return reinterpret_cast<const std::uint16_t*>(bytes);
-    };
-    const auto owner = communicator.allocate_on_node_together(
-        count * sizeof(std::uint16_t), [&](std::span<std::byte> memory, int rank, int ranks) {
-          const std::span samples(reinterpret_cast<std::uint16_t*>(memory.data()), count);
-          pool.for_each(kPartsPerRank, [&](int part, int /*slot*/) {
-            fill(samples, rank * kPartsPerRank + part, ranks * kPartsPerRank);
-          });
-        });
-    return SharedArray<std::uint16_t>(owner, {samples_of(owner.get()), count});
+/// Collective where it provides memory: such that the ranks of a node share.
+FieldLevelMemory node_memory(const Communicator& communicator) {
+  return [communicator](std::size_t bytes) {
+    return SampleMemory{communicator.allocate_on_node(bytes), communicator.node().size() > 1};
   };
 }
 
@@ -100,12 +88,12 @@ FieldRenderers renderers_of(const std::shared_ptr<const CompressedAttenuationFie
   made.look_up = look_up_of_searches(look_up, field->slabs.size());
   FieldLevels pyramid;
   if (pays_to_decode(*field)) {
-    const auto samples = std::make_shared<const FieldLevel>(decode_field(*field, memory));
+    const auto samples = std::make_shared<const FieldLevel>(decode_field(field, memory));
     made.levels.push_back(make_field_renderer(samples, made.look_up, pool));
-    if (halvings > 0) pyramid = make_field_pyramid(*samples, halvings, memory);
+    if (halvings > 0) pyramid = make_field_pyramid(samples, halvings, memory);
   } else {
     made.levels.push_back(make_field_renderer(field, made.look_up, pool));
-    if (halvings > 0) pyramid = make_field_pyramid(*field, halvings, memory);
+    if (halvings > 0) pyramid = make_field_pyramid(field, halvings, memory);
   }
   for (auto i = static_cast<std::size_t>(more_halvings); i < pyramid.size(); ++i) {
     made.levels.push_back(
@@ -195,7 +183,7 @@ FieldRenderers renderers_of_atlas(const OpenedField& opened,
                                              levels,
                                              threads.own,
                                              threads.coarse,
-                                             node_memory(communicator, *threads.coarse));
+                                             node_memory(communicator));
     members->keep(i, std::make_shared<const MemberLevels>(made.levels));
     if (set.blur_sigma_mm.empty()) set.blur_sigma_mm = made.blur_sigma_mm;
     set.look_up = made.look_up;
@@ -204,6 +192,25 @@ FieldRenderers renderers_of_atlas(const OpenedField& opened,
     set.levels.push_back(
         std::make_shared<const FieldSetDrr>(atlas_level(opened.coverage().planes, members, level)));
   return set;
+}
+
+/// Collective. Volumes that are blurred by already_mm, blurred by sigma_mm.
+CastVolumes blurred_volumes(const CastVolumes& volumes,
+                            double sigma_mm,
+                            double already_mm,
+                            const Communicator& communicator) {
+  CastVolumes blurred = volumes;
+  for (auto* volume : {&blurred.all, &blurred.bone})
+    if (*volume) *volume = blurred_per_node(**volume, sigma_mm, already_mm, communicator);
+  return blurred;
+}
+
+std::shared_ptr<const DrrRenderer> sampled_twice_per_sigma(const CastVolumes& blurred,
+                                                           double sigma_mm,
+                                                           const CaseLoadOptions& options) {
+  RayCasterOptions caster = options.ray_caster;
+  caster.step_mm = std::max(caster.step_mm, 0.5 * sigma_mm);
+  return ray_cast_through(blurred, caster, options);
 }
 
 }  // namespace
@@ -230,12 +237,8 @@ std::shared_ptr<const DrrRenderer> coarse_ray_cast(const CastVolumes& volumes,
                                                    double sigma_mm,
                                                    const CaseLoadOptions& options,
                                                    const Communicator& communicator) {
-  RayCasterOptions caster = options.ray_caster;
-  caster.step_mm = std::max(caster.step_mm, 0.5 * sigma_mm);
-  CastVolumes blurred = volumes;
-  blurred.all = blurred_per_node(*volumes.all, sigma_mm, communicator);
-  if (volumes.bone) blurred.bone = blurred_per_node(*volumes.bone, sigma_mm, communicator);
-  return ray_cast_through(blurred, caster, options);
+  return sampled_twice_per_sigma(
+      blurred_volumes(volumes, sigma_mm, 0.0, communicator), sigma_mm, options);
 }
 
 std::vector<RendererLevel> coarse_ray_casts(const CastVolumes& volumes,
@@ -243,12 +246,18 @@ std::vector<RendererLevel> coarse_ray_casts(const CastVolumes& volumes,
                                             const Communicator& communicator) {
   std::vector<RendererLevel> levels;
   const int coarsest_level = std::max(options.coarsest_level, options.judging_level);
+  CastVolumes below = volumes;
+  double below_mm = 0.0;
   for (int level = 1; level <= coarsest_level; ++level) {
     const auto at = static_cast<std::size_t>(level - 1);
     const double sigma_mm = at < options.level_blur_sigma_mm.size()
                                 ? options.level_blur_sigma_mm[at]
                                 : kAssumedNodeMm * level_blur_sigma_in_nodes(level, true);
-    levels.push_back({coarse_ray_cast(volumes, sigma_mm, options, communicator), sigma_mm});
+    const bool goes_on = sigma_mm > below_mm;
+    below = blurred_volumes(
+        goes_on ? below : volumes, sigma_mm, goes_on ? below_mm : 0.0, communicator);
+    below_mm = sigma_mm;
+    levels.push_back({sampled_twice_per_sigma(below, sigma_mm, options), sigma_mm});
   }
   return levels;
 }
@@ -270,7 +279,7 @@ FieldRenderers field_renderers(const OpenedField& opened,
                         levels,
                         threads.own,
                         threads.coarse,
-                        node_memory(communicator, *threads.coarse));
+                        node_memory(communicator));
   };
   FieldRenderers all = renderers(opened);
   FieldRenderers of_bone;

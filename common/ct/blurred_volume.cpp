@@ -3,9 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <numeric>
 #include <utility>
 
 #include "base/error.h"
+#include "base/vector_width.h"
+#include "ct/blurred_volume_kernel.h"
 
 namespace af {
 
@@ -27,36 +31,100 @@ std::vector<float> weights_of_variance(double variance) {
     }
     weights = std::move(wider);
   }
-  return {weights.begin(), weights.end()};
+  constexpr double kLeastWeight = 1e-6;
+  while (weights.size() > 1 && weights.front() < kLeastWeight)
+    weights = {weights.begin() + 1, weights.end() - 1};
+  const double sum = std::accumulate(weights.begin(), weights.end(), 0.0);
+  std::vector<float> normalised;
+  for (const double weight : weights) normalised.push_back(static_cast<float>(weight / sum));
+  return normalised;
 }
 
-/// Which of `count` samples a window of weights that begins at `first` meets.
-struct Overlap {
-  int begin, end;  ///< of the weights
+/// The taps of an axis whose values lie `stride` apart, for a coarse voxel whose first weight
+/// stands at fine index `first` of `count`: those within the volume.
+class AxisTaps {
+ public:
+  AxisTaps(std::span<const float> weights, int first, int count, std::int64_t stride) {
+    const int begin = std::max(0, -first);
+    const int end = std::max(begin, std::min(static_cast<int>(weights.size()), count - first));
+    for (int k = begin; k < end; ++k) offsets_.push_back((first + k) * stride);
+    weights_ = weights.data() + begin;
+  }
+
+  [[nodiscard]] WeightedTaps taps() const {
+    return {offsets_.data(), weights_, static_cast<std::int32_t>(offsets_.size())};
+  }
+
+ private:
+  std::vector<std::int64_t> offsets_;
+  const float* weights_;
 };
 
-Overlap overlap(int first, std::size_t weights, int count) {
-  return {std::max(0, -first), std::min(static_cast<int>(weights), count - first)};
-}
+/// Blurs rows and keeps every factor-th value: values that lie `factor` apart are laid side by side
+/// first, so that sums over neighbours are sums over vectors.
+class RowBlur {
+ public:
+  /// `first`: fine index of the first weight of the first coarse value.
+  RowBlur(std::span<const float> weights, int factor, int first, int fine, int coarse)
+      : weights_(weights),
+        factor_(factor),
+        begin_(-first),
+        fine_(fine),
+        coarse_(coarse),
+        phase_length_(coarse + static_cast<int>(weights.size()) / factor + 1),
+        phases_(static_cast<std::size_t>(factor) * static_cast<std::size_t>(phase_length_)) {
+    for (std::int64_t k = 0; k < std::ssize(weights); ++k)
+      offsets_.push_back(k % factor * phase_length_ + k / factor);
+  }
+
+  void operator()(const float* row, float* blurred) {
+    // Fine value i stands begin_ + i places after the first weight; what lies outside stays 0.
+    for (int i = 0; i < std::min(factor_, fine_); ++i) {
+      const int place = begin_ + i;
+      float* phase = phases_.data() + place % factor_ * phase_length_ + place / factor_;
+      for (int j = i; j < fine_; j += factor_) *phase++ = row[j];
+    }
+    select_kernel<SumWeightedValues>(kernels_128::sum_weighted_values,
+                                     kernels_256::sum_weighted_values,
+                                     kernels_512::sum_weighted_values)(
+        phases_.data(),
+        {offsets_.data(), weights_.data(), static_cast<std::int32_t>(offsets_.size())},
+        coarse_,
+        blurred);
+  }
+
+ private:
+  std::span<const float> weights_;
+  int factor_;
+  int begin_;
+  int fine_;
+  int coarse_;
+  int phase_length_;
+  std::vector<float> phases_;
+  std::vector<std::int64_t> offsets_;
+};
 
 }  // namespace
 
-VolumeBlur::Axis VolumeBlur::make_axis(double spacing_mm, double sigma_mm) {
+VolumeBlur::Axis VolumeBlur::make_axis(double spacing_mm, double sigma_mm, double already_mm) {
+  const double added = (sigma_mm * sigma_mm - already_mm * already_mm) / (spacing_mm * spacing_mm);
+  const auto interpolation = [](int factor) { return (factor * factor - 1) / 6.0; };
   Axis axis;
   axis.factor = std::max(1, static_cast<int>(0.5 * sigma_mm / spacing_mm));
-  const double interpolation = (axis.factor * axis.factor - 1) / 6.0;
-  axis.weights = weights_of_variance(std::pow(sigma_mm / spacing_mm, 2) - interpolation);
+  while (interpolation(axis.factor) > added) --axis.factor;
+  axis.weights = weights_of_variance(added - interpolation(axis.factor));
   // The outermost voxels of the fine volume are 0; so is the first voxel of the coarse one.
   axis.first = -axis.radius();
   return axis;
 }
 
-VolumeBlur::VolumeBlur(const CtGrid& fine, double sigma_mm) : fine_size_(fine.size), grid_(fine) {
-  check(sigma_mm > 0.0, "a blur needs a positive sigma");
+VolumeBlur::VolumeBlur(const CtGrid& fine, double sigma_mm, double already_mm)
+    : fine_size_(fine.size), grid_(fine) {
+  check(sigma_mm > already_mm && already_mm >= 0.0, "a blur needs a positive sigma");
   Eigen::Vector3d first;
   for (std::size_t i = 0; i < 3; ++i) {
     const auto at = static_cast<Eigen::Index>(i);
-    axes_[i] = make_axis(fine.spacing_mm[at], sigma_mm);
+    axes_[i] = make_axis(fine.spacing_mm[at], sigma_mm, already_mm);
     const Axis& axis = axes_[i];
     first[at] = axis.first;
     grid_.spacing_mm[at] = axis.factor * fine.spacing_mm[at];
@@ -67,75 +135,48 @@ VolumeBlur::VolumeBlur(const CtGrid& fine, double sigma_mm) : fine_size_(fine.si
   require_castable(grid_);
 }
 
-/// One slice along i and j: `blurred` has the coarse grid's columns and rows.
-void VolumeBlur::blur_slice(const std::uint16_t* slice,
-                            std::vector<float>& along_rows,
-                            std::vector<float>& blurred) const {
-  const int width = grid_.size[0];
-  const Axis& x = axes_[0];
-  for (int j = 0; j < fine_size_[1]; ++j) {
-    const std::uint16_t* row = slice + static_cast<std::ptrdiff_t>(j) * fine_size_[0];
-    float* to = along_rows.data() + static_cast<std::ptrdiff_t>(j) * width;
-    for (int i = 0; i < width; ++i) {
-      const int from = x.first + i * x.factor - x.radius();
-      const Overlap taps = overlap(from, x.weights.size(), fine_size_[0]);
-      float sum = 0.0f;
-      for (int k = taps.begin; k < taps.end; ++k)
-        sum += x.weights[static_cast<std::size_t>(k)] * static_cast<float>(row[from + k]);
-      to[i] = sum;
-    }
-  }
-  const Axis& y = axes_[1];
-  std::ranges::fill(blurred, 0.0f);
-  for (int j = 0; j < grid_.size[1]; ++j) {
-    float* to = blurred.data() + static_cast<std::ptrdiff_t>(j) * width;
-    const int from = y.first + j * y.factor - y.radius();
-    const Overlap taps = overlap(from, y.weights.size(), fine_size_[1]);
-    for (int k = taps.begin; k < taps.end; ++k) {
-      const float weight = y.weights[static_cast<std::size_t>(k)];
-      const float* row = along_rows.data() + static_cast<std::ptrdiff_t>(from + k) * width;
-      for (int i = 0; i < width; ++i) to[i] += weight * row[i];
-    }
-  }
-}
-
 void VolumeBlur::fill(const AttenuationVolume& from, std::span<std::uint16_t> voxels) const {
   check(from.grid().size == fine_size_, "the volume that the blur was made for");
   check(voxels.size() == grid_.voxel_count(), "one voxel per grid point");
+  const auto sum_weighted_voxels =
+      select_kernel<SumWeightedVoxels>(kernels_128::sum_weighted_voxels,
+                                       kernels_256::sum_weighted_voxels,
+                                       kernels_512::sum_weighted_voxels);
+  const auto sum_weighted_values =
+      select_kernel<SumWeightedValues>(kernels_128::sum_weighted_values,
+                                       kernels_256::sum_weighted_values,
+                                       kernels_512::sum_weighted_values);
+  const Axis& x = axes_[0];
+  const Axis& y = axes_[1];
   const Axis& z = axes_[2];
-  const std::size_t area =
-      static_cast<std::size_t>(grid_.size[0]) * static_cast<std::size_t>(grid_.size[1]);
-  const std::size_t fine_area =
-      static_cast<std::size_t>(fine_size_[0]) * static_cast<std::size_t>(fine_size_[1]);
-  std::vector<float> along_rows(static_cast<std::size_t>(grid_.size[0]) *
-                                static_cast<std::size_t>(fine_size_[1]));
-  // The slices that one coarse slice needs, each at its place in the rotation.
-  std::vector<std::vector<float>> slices(z.weights.size(), std::vector<float>(area));
-  std::vector<float> sums(area);
-  int next = 0;
+  const std::int64_t fine_width = fine_size_[0];
+  const std::int64_t fine_area = fine_width * fine_size_[1];
+  std::vector<AxisTaps> rows_taps;
+  for (int j = 0; j < grid_.size[1]; ++j)
+    rows_taps.emplace_back(y.weights, y.first_of(j), fine_size_[1], fine_width);
+  RowBlur blur_row(x.weights, x.factor, x.first_of(0), fine_size_[0], grid_.size[0]);
+  std::vector<float> slice(static_cast<std::size_t>(fine_area));
+  std::vector<float> row(static_cast<std::size_t>(fine_width));
+  std::vector<float> blurred(static_cast<std::size_t>(grid_.size[0]));
+  std::uint16_t* to = voxels.data();
   for (int k = 0; k < grid_.size[2]; ++k) {
-    const int first = z.first + k * z.factor - z.radius();
-    const Overlap taps = overlap(first, z.weights.size(), fine_size_[2]);
-    std::ranges::fill(sums, 0.0f);
-    for (int tap = taps.begin; tap < taps.end; ++tap) {
-      const int slice = first + tap;
-      std::vector<float>& blurred = slices[static_cast<std::size_t>(slice) % slices.size()];
-      for (; next <= slice; ++next)
-        blur_slice(from.voxels().data() + static_cast<std::size_t>(next) * fine_area,
-                   along_rows,
-                   slices[static_cast<std::size_t>(next) % slices.size()]);
-      const float weight = z.weights[static_cast<std::size_t>(tap)];
-      for (std::size_t i = 0; i < area; ++i) sums[i] += weight * blurred[i];
+    const AxisTaps slice_taps(z.weights, z.first_of(k), fine_size_[2], fine_area);
+    sum_weighted_voxels(from.voxels().data(), slice_taps.taps(), fine_area, slice.data());
+    for (int j = 0; j < grid_.size[1]; ++j, to += grid_.size[0]) {
+      sum_weighted_values(
+          slice.data(), rows_taps[static_cast<std::size_t>(j)].taps(), fine_width, row.data());
+      blur_row(row.data(), blurred.data());
+      for (std::size_t i = 0; i < blurred.size(); ++i)
+        to[i] =
+            static_cast<std::uint16_t>(blurred[i] + 0.5f);  // NOLINT(bugprone-incorrect-roundings)
     }
-    std::uint16_t* to = voxels.data() + static_cast<std::size_t>(k) * area;
-    for (std::size_t i = 0; i < area; ++i)
-      to[i] = static_cast<std::uint16_t>(sums[i] + 0.5f);  // NOLINT(bugprone-incorrect-roundings)
   }
 }
 
 std::shared_ptr<const AttenuationVolume> blurred_volume(const AttenuationVolume& volume,
-                                                        double sigma_mm) {
-  const VolumeBlur blur(volume.grid(), sigma_mm);
+                                                        double sigma_mm,
+                                                        double already_mm) {
+  const VolumeBlur blur(volume.grid(), sigma_mm, already_mm);
   std::vector<std::uint16_t> voxels(blur.grid().voxel_count());
   blur.fill(volume, voxels);
   return std::make_shared<const AttenuationVolume>(

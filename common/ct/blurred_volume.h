@@ -18,12 +18,13 @@ namespace af {
 /// sigma, so that interpolation leaves no trace of where the voxels lie. The weights are (a, 1 -
 /// 2a, a), 0 < a <= 1/4, applied n times: their variance 2 a n is exact. Trilinear interpolation of
 /// voxels h apart itself blurs by h^2 / 6; the weights blur less by what this adds beyond that of
-/// the CT. \test VolumeBlur.SpreadsAVoxelByTheVariance
+/// the CT. Weights below a millionth are left out. \test VolumeBlur.SpreadsAVoxelByTheVariance
 class VolumeBlur {
  public:
-  /// `fine`: grid with border of an AttenuationVolume. sigma_mm is positive. InputError when the
-  /// blurred volume would have 2^31 voxels or more.
-  VolumeBlur(const CtGrid& fine, double sigma_mm);
+  /// `fine`: grid with border of an AttenuationVolume, which may be a CT that is blurred already,
+  /// by `already_mm` < sigma_mm, so that a pyramid of volumes costs little more than its first one.
+  /// InputError when the blurred volume would have 2^31 voxels or more.
+  VolumeBlur(const CtGrid& fine, double sigma_mm, double already_mm = 0.0);
 
   /// Grid with border of the blurred volume.
   [[nodiscard]] const CtGrid& grid() const { return grid_; }
@@ -37,19 +38,19 @@ class VolumeBlur {
     std::vector<float> weights;  ///< 2 radius() + 1
 
     [[nodiscard]] int radius() const { return static_cast<int>(weights.size() / 2); }
+    /// Fine index of the first weight of a coarse voxel; may be negative.
+    [[nodiscard]] int first_of(int coarse) const { return first + coarse * factor - radius(); }
   };
-  static Axis make_axis(double spacing_mm, double sigma_mm);
-  void blur_slice(const std::uint16_t* slice,
-                  std::vector<float>& along_rows,
-                  std::vector<float>& blurred) const;
+  static Axis make_axis(double spacing_mm, double sigma_mm, double already_mm);
 
   std::array<int, 3> fine_size_;
   std::array<Axis, 3> axes_;
   CtGrid grid_;
 };
 
-/// The blurred volume, in memory of this process.
+/// The blurred volume, in memory of this process; arguments as of VolumeBlur.
 std::shared_ptr<const AttenuationVolume> blurred_volume(const AttenuationVolume& volume,
-                                                        double sigma_mm);
+                                                        double sigma_mm,
+                                                        double already_mm = 0.0);
 
 }  // namespace af

@@ -4,10 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <string>
+#include <utility>
 
 #include "base/error.h"
-#include "base/thread_pool.h"
 #include "base/vector_width.h"
 #include "drr/field_level_kernel.h"
 #include "drr/filtered_decoding.h"
@@ -76,29 +77,27 @@ class BorderedPlane {
   std::vector<std::uint16_t> samples_;
 };
 
-/// A part's share of `count` units.
-struct Share {
-  int begin, end;
-};
-
-Share share_of(int count, int part, int parts) {
-  const auto edge = [&](int i) {
-    return static_cast<int>(static_cast<std::int64_t>(count) * i / parts);
-  };
-  return {edge(part), edge(part + 1)};
+SampleExtent extent_of(const LightSlab& field_geometry, const SlabGeometry& slab) {
+  return {field_geometry.u.nodes,
+          field_geometry.v.nodes,
+          static_cast<std::size_t>(slab.stored_s.count) *
+              static_cast<std::size_t>(slab.stored_t.count)};
 }
 
-/// Where the samples of viewpoint (u, v) begin; null when the tiles' padding goes beyond the last
-/// viewpoint.
-std::uint16_t* viewpoint_samples(const SlabLattice& lattice,
-                                 int u,
-                                 int v,
-                                 std::size_t samples_per_viewpoint,
-                                 std::span<std::uint16_t> samples) {
-  if (u >= lattice.u.nodes || v >= lattice.v.nodes) return nullptr;
-  const auto viewpoint = static_cast<std::size_t>(u) * static_cast<std::size_t>(lattice.v.nodes) +
-                         static_cast<std::size_t>(v);
-  return samples.data() + viewpoint * samples_per_viewpoint;
+/// A viewpoint of a tile, and where its samples go.
+struct TileViewpoint {
+  int u, v;
+  std::uint16_t* samples;
+};
+
+/// Viewpoint i = 2 du + dv of tile (a, b); without samples where it pads the last tiles.
+TileViewpoint viewpoint_of_tile(
+    const SampleExtent& extent, int a, int b, int i, std::span<std::uint16_t> samples) {
+  const int u = 2 * a + i / 2;
+  const int v = 2 * b + i % 2;
+  if (u >= extent.u_nodes || v >= extent.v_nodes) return {u, v, nullptr};
+  const auto viewpoint = static_cast<std::size_t>(u * extent.v_nodes + v);
+  return {u, v, samples.data() + viewpoint * extent.per_viewpoint};
 }
 
 /// Halves one bordered plane into a viewpoint's samples.
@@ -123,167 +122,185 @@ class Halving {
   HalvePlane halve_plane_;
 };
 
-/// Decodes a share of one slab's viewpoints, halved when `level` is 1.
-void decode_slab(const CompressedAttenuationField& field,
-                 std::size_t k,
-                 const FieldLevelSlab& to,
-                 int level,
-                 Share u_tiles,
-                 std::span<std::uint16_t> samples) {
-  const SlabGeometry& fine = field.light_slab.slabs[k];
-  const auto decode_tiles = select_kernel<DecodeTiles>(
-      kernels_128::decode_tiles, kernels_256::decode_tiles, kernels_512::decode_tiles);
-  const SlabGeometry coarse = halved_geometry(fine);
-  std::array<BorderedPlane, 4> planes{BorderedPlane(fine, coarse),
-                                      BorderedPlane(fine, coarse),
-                                      BorderedPlane(fine, coarse),
-                                      BorderedPlane(fine, coarse)};
-  Halving halve(coarse);
-  const SlabLattice lattice = field.lattice(k);
-  const int v_tiles = lattice.v.stored.tiles();
-  const bool has_means = field.codebook.has_means();
-  const auto st_values = static_cast<std::size_t>(lattice.s.stored.tiles()) *
-                         static_cast<std::size_t>(lattice.t.stored.tiles()) *
-                         field.codebook.values_per_tile();
-  for (int a = u_tiles.begin; a < u_tiles.end; ++a)
-    for (int b = 0; b < v_tiles; ++b) {
-      std::array<std::uint16_t*, 4> targets{};
-      std::array<std::uint16_t*, 4> decoded{};
-      for (int i = 0; i < 4; ++i) {
-        const auto at = static_cast<std::size_t>(i);
-        targets[at] = viewpoint_samples(
-            lattice, 2 * a + i / 2, 2 * b + i % 2, to.samples_per_viewpoint(), samples);
-        if (targets[at] != nullptr) decoded[at] = planes[at].stored();
+/// Decodes viewpoint tiles of a slab whose tiles have no filter, for level 0 or, halved, for
+/// level 1.
+class TileDecoding {
+ public:
+  TileDecoding(std::shared_ptr<const CompressedAttenuationField> field,
+               std::size_t slab,
+               const SlabGeometry& coarse,
+               int level)
+      : field_(std::move(field)),
+        slab_(slab),
+        fine_(field_->light_slab.slabs[slab]),
+        coarse_(coarse),
+        level_(level) {}
+
+  void operator()(int a, int b, std::span<std::uint16_t> samples) const {
+    const SampleExtent extent = extent_of(field_->light_slab, level_ > 0 ? coarse_ : fine_);
+    const BorderedPlane plane(fine_, coarse_);
+    std::array planes{plane, plane, plane, plane};
+    std::array<std::uint16_t*, 4> decoded{};
+    for (std::size_t i = 0; i < 4; ++i)
+      if (viewpoint_of_tile(extent, a, b, static_cast<int>(i), samples).samples != nullptr)
+        decoded[i] = planes[i].stored();
+    select_kernel<DecodeTiles>(
+        kernels_128::decode_tiles, kernels_256::decode_tiles, kernels_512::decode_tiles)(
+        tile_plane(a, b), plane.width(), decoded.data());
+    Halving halve(coarse_);
+    for (std::size_t i = 0; i < 4; ++i) {
+      if (decoded[i] == nullptr) continue;
+      std::uint16_t* const to =
+          viewpoint_of_tile(extent, a, b, static_cast<int>(i), samples).samples;
+      if (level_ > 0) {
+        halve(planes[i], to);
+        continue;
       }
-      const std::size_t uv_tile = static_cast<std::size_t>(a) * static_cast<std::size_t>(v_tiles) +
-                                  static_cast<std::size_t>(b);
-      decode_tiles({field.slabs[k].indices.data() + uv_tile * st_values,
-                    field.codebook.codewords.data()->data(),
-                    fine.stored_s.tiles(),
-                    fine.stored_t.tiles(),
-                    has_means},
-                   planes[0].width(),
-                   decoded.data());
-      for (std::size_t i = 0; i < 4; ++i) {
-        if (targets[i] == nullptr) continue;
-        if (level > 0) {
-          halve(planes[i], targets[i]);
-          continue;
-        }
-        for (int row = 0; row < fine.stored_t.count; ++row)
-          std::copy_n(planes[i].stored() + static_cast<std::ptrdiff_t>(row) * planes[i].width(),
-                      fine.stored_s.count,
-                      targets[i] + static_cast<std::ptrdiff_t>(row) * fine.stored_s.count);
-      }
+      for (int row = 0; row < fine_.stored_t.count; ++row)
+        std::copy_n(decoded[i] + static_cast<std::ptrdiff_t>(row) * plane.width(),
+                    fine_.stored_s.count,
+                    to + static_cast<std::ptrdiff_t>(row) * fine_.stored_s.count);
     }
-}
-
-/// Halves a share of one slab's viewpoints.
-void halve_slab(const FieldLevelSlab& from,
-                const FieldLevelSlab& to,
-                Share viewpoints,
-                std::span<std::uint16_t> samples) {
-  const SlabGeometry& fine = from.geometry;
-  BorderedPlane plane(fine, to.geometry);
-  Halving halve(to.geometry);
-  for (int viewpoint = viewpoints.begin; viewpoint < viewpoints.end; ++viewpoint) {
-    const auto at = static_cast<std::size_t>(viewpoint);
-    const std::uint16_t* source = from.samples.data() + at * from.samples_per_viewpoint();
-    for (int row = 0; row < fine.stored_t.count; ++row)
-      std::copy_n(source + static_cast<std::ptrdiff_t>(row) * fine.stored_s.count,
-                  fine.stored_s.count,
-                  plane.stored() + static_cast<std::ptrdiff_t>(row) * plane.width());
-    halve(plane, samples.data() + at * to.samples_per_viewpoint());
   }
+
+ private:
+  [[nodiscard]] TilePlane tile_plane(int a, int b) const {
+    const SlabLattice lattice = field_->lattice(slab_);
+    const Codebook& codebook = field_->codebook;
+    const auto st_values = static_cast<std::size_t>(lattice.s.stored.tiles()) *
+                           static_cast<std::size_t>(lattice.t.stored.tiles()) *
+                           codebook.values_per_tile();
+    const auto uv_tile = static_cast<std::size_t>(a * lattice.v.stored.tiles() + b);
+    return {field_->slabs[slab_].indices.data() + uv_tile * st_values,
+            codebook.codewords.data()->data(),
+            fine_.stored_s.tiles(),
+            fine_.stored_t.tiles(),
+            codebook.has_means()};
+  }
+
+  std::shared_ptr<const CompressedAttenuationField> field_;
+  std::size_t slab_;
+  SlabGeometry fine_;
+  SlabGeometry coarse_;
+  int level_;
+};
+
+/// Halves viewpoint tiles of one slab of the level below.
+class TileHalving {
+ public:
+  TileHalving(std::shared_ptr<const FieldLevel> from, std::size_t slab, const SlabGeometry& coarse)
+      : from_(std::move(from)), slab_(from_->slabs[slab]), coarse_(coarse) {}
+
+  void operator()(int a, int b, std::span<std::uint16_t> samples) const {
+    const SlabGeometry& fine = slab_.geometry;
+    const SampleExtent extent = extent_of(from_->field_geometry, coarse_);
+    BorderedPlane plane(fine, coarse_);
+    Halving halve(coarse_);
+    for (int i = 0; i < 4; ++i) {
+      const TileViewpoint to = viewpoint_of_tile(extent, a, b, i, samples);
+      if (to.samples == nullptr) continue;
+      const std::uint16_t* const source = slab_.samples.viewpoints(to.u, to.v);
+      for (int row = 0; row < fine.stored_t.count; ++row)
+        std::copy_n(source + static_cast<std::ptrdiff_t>(row) * fine.stored_s.count,
+                    fine.stored_s.count,
+                    plane.stored() + static_cast<std::ptrdiff_t>(row) * plane.width());
+      halve(plane, to.samples);
+    }
+  }
+
+ private:
+  std::shared_ptr<const FieldLevel> from_;
+  const FieldLevelSlab& slab_;
+  SlabGeometry coarse_;
+};
+
+/// The sum of a slab's levels, those of padded tiles included, as its codewords have them.
+double codeword_levels(const CompressedAttenuationField& field, std::size_t slab) {
+  const Codebook& codebook = field.codebook;
+  const bool has_means = codebook.has_means();
+  std::vector<std::int64_t> sums;
+  for (const Tile& codeword : codebook.codewords) {
+    const std::int64_t sum = std::accumulate(codeword.begin(), codeword.end(), std::int64_t{0});
+    sums.push_back(has_means ? sum - static_cast<std::int64_t>(kTileElements) * kShapeZero : sum);
+  }
+  const auto row = static_cast<std::size_t>(field.lattice(slab).t.stored.tiles());
+  const std::span<const std::uint16_t> values = field.slabs[slab].indices.view();
+  std::int64_t total = 0;
+  for (std::size_t at = 0; at < values.size(); at += codebook.values_per_tile() * row)
+    for (std::size_t i = at; i < at + row; ++i) {
+      if (values[i] == 0) continue;
+      total += sums[values[i]];
+      if (has_means) total += static_cast<std::int64_t>(kTileElements) * values[i + row];
+    }
+  return static_cast<double>(total);
 }
 
-/// The samples of one slab of a level, filled in parts, and their padding.
-SharedArray<std::uint16_t> padded_samples(const FieldLevel& level,
-                                          const FieldLevelSlab& slab,
-                                          const FieldLevelMemory& memory,
-                                          const FieldLevelFill& fill) {
-  const std::size_t count = level.viewpoint_count() * slab.samples_per_viewpoint();
-  return memory(count + kFieldLevelPadding,
-                [&](std::span<std::uint16_t> samples, int part, int parts) {
-                  if (part == 0) std::ranges::fill(samples.subspan(count), std::uint16_t{0});
-                  fill(samples.first(count), part, parts);
-                });
-}
-
-/// Level 0 or 1 of a field, slab by slab: decode(k, slab, samples, part, parts).
-template <typename Decode>
+/// Level 0 or 1 of a field, slab by slab: `make_tile(slab, its halved geometry)` makes its tiles.
+template <typename MakeTile>
 FieldLevel decoded_slabs(const CompressedAttenuationField& field,
                          int level,
                          const FieldLevelMemory& memory,
-                         const Decode& decode) {
+                         const MakeTile& make_tile) {
   FieldLevel result{level, field.light_slab, field.quantizer_step, {}};
   for (std::size_t k = 0; k < field.slabs.size(); ++k) {
     const SlabGeometry& fine = field.light_slab.slabs[k];
-    FieldLevelSlab slab{level == 0 ? fine : halved_geometry(fine), {}};
-    slab.samples = padded_samples(result, slab, memory, [&](auto samples, int part, int parts) {
-      decode(k, slab, samples, part, parts);
-    });
-    result.slabs.push_back(std::move(slab));
+    const SlabGeometry geometry = level == 0 ? fine : halved_geometry(fine);
+    result.slabs.push_back({geometry,
+                            {extent_of(field.light_slab, geometry), memory, make_tile(k)},
+                            field.slabs.size() > 1 ? codeword_levels(field, k) : 1.0});
   }
   return result;
 }
 
-FieldLevel decoded_level(const CompressedAttenuationField& field,
+FieldLevel decoded_level(const std::shared_ptr<const CompressedAttenuationField>& field,
                          int level,
                          const FieldLevelMemory& memory) {
-  check(!field.codebook.filter, "tiles without a filter");
-  return decoded_slabs(
-      field,
-      level,
-      memory,
-      [&](std::size_t k, const FieldLevelSlab& slab, auto samples, int part, int parts) {
-        const int u_tiles = field.lattice(k).u.stored.tiles();
-        decode_slab(field, k, slab, level, share_of(u_tiles, part, parts), samples);
-      });
+  check(!field->codebook.filter, "tiles without a filter");
+  return decoded_slabs(*field, level, memory, [&](std::size_t k) {
+    return TileDecoding(field, k, halved_geometry(field->light_slab.slabs[k]), level);
+  });
 }
 
 /// Level 0 of a field whose codebook has a filter.
-FieldLevel filtered_level_0(const CompressedAttenuationField& field,
+FieldLevel filtered_level_0(const std::shared_ptr<const CompressedAttenuationField>& field,
                             const FieldLevelMemory& memory) {
-  const FilteredDecoding decoding(field);
-  return decoded_slabs(
-      field,
-      0,
-      memory,
-      [&](std::size_t k, const FieldLevelSlab& /*slab*/, auto samples, int part, int parts) {
-        const Share rows = share_of(field.lattice(k).t.stored.tiles(), part, parts);
-        decoding.decode(k, rows.begin, rows.end, samples);
-      });
+  const auto decoding = std::make_shared<const FilteredDecoding>(field);
+  return decoded_slabs(*field, 0, memory, [&](std::size_t k) {
+    return [decoding, k](int a, int b, std::span<std::uint16_t> samples) {
+      decoding->decode(k, a, b, samples);
+    };
+  });
 }
 
-FieldLevelSlab halved_slab(const FieldLevelSlab& from,
-                           const FieldLevel& level,
+FieldLevelSlab halved_slab(const std::shared_ptr<const FieldLevel>& from,
+                           std::size_t slab,
                            const FieldLevelMemory& memory) {
-  FieldLevelSlab slab{halved_geometry(from.geometry), {}};
-  slab.samples = padded_samples(level, slab, memory, [&](auto samples, int part, int parts) {
-    const auto viewpoints = static_cast<int>(level.viewpoint_count());
-    halve_slab(from, slab, share_of(viewpoints, part, parts), samples);
-  });
-  return slab;
+  const SlabGeometry geometry = halved_geometry(from->slabs[slab].geometry);
+  return {geometry,
+          {extent_of(from->field_geometry, geometry), memory, TileHalving(from, slab, geometry)},
+          from->slabs[slab].weight};
 }
 
-FieldLevelSlab merged_slab(const LightSlab& field_geometry,
-                           std::span<const FieldLevelSlab> from,
-                           const FieldLevel& level,
+/// Of two slabs from `first` on.
+FieldLevelSlab merged_slab(const std::shared_ptr<const FieldLevel>& from,
+                           std::size_t first,
                            const FieldLevelMemory& memory) {
-  const SlabMerging merging(field_geometry, from);
-  FieldLevelSlab slab{merging.geometry(), {}};
-  slab.samples = padded_samples(level, slab, memory, [&](auto samples, int part, int parts) {
-    const Share share = share_of(static_cast<int>(level.viewpoint_count()), part, parts);
-    merging.merge(share.begin, share.end, samples);
-  });
-  return slab;
+  const std::span slabs = std::span(from->slabs).subspan(first, 2);
+  const auto merging = std::make_shared<const SlabMerging>(from->field_geometry, slabs);
+  const SampleExtent extent = extent_of(from->field_geometry, merging->geometry());
+  const auto make_tile = [from, merging, extent](int a, int b, std::span<std::uint16_t> samples) {
+    for (int i = 0; i < 4; ++i)
+      if (const TileViewpoint to = viewpoint_of_tile(extent, a, b, i, samples);
+          to.samples != nullptr)
+        merging->merge(to.u, to.v, {to.samples, extent.per_viewpoint});
+  };
+  return {merging->geometry(), {extent, memory, make_tile}, slabs[0].weight + slabs[1].weight};
 }
 
 /// Up to coarsest_level, each from the one before.
 void append_levels(int coarsest_level, const FieldLevelMemory& memory, FieldLevels& levels) {
   while (static_cast<int>(levels.size()) < coarsest_level)
-    levels.push_back(std::make_shared<const FieldLevel>(next_field_level(*levels.back(), memory)));
+    levels.push_back(std::make_shared<const FieldLevel>(next_field_level(levels.back(), memory)));
 }
 
 }  // namespace
@@ -328,76 +345,59 @@ float FieldLevel::node_value(std::size_t slab, const NodeIndex& node) const {
   const NodeRange& s = of_slab.geometry.stored_s;
   const NodeRange& t = of_slab.geometry.stored_t;
   if (node.s < s.begin || node.s >= s.end() || node.t < t.begin || node.t >= t.end()) return 0.0f;
-  const auto viewpoint = static_cast<std::size_t>(node.u * field_geometry.v.nodes + node.v);
   const auto of_viewpoint =
       static_cast<std::size_t>(node.t - t.begin) * static_cast<std::size_t>(s.count) +
       static_cast<std::size_t>(node.s - s.begin);
   return quantizer_step *
-         static_cast<float>(
-             of_slab.samples[viewpoint * of_slab.samples_per_viewpoint() + of_viewpoint]);
+         static_cast<float>(of_slab.samples.viewpoints(node.u, node.v)[of_viewpoint]);
 }
 
 double FieldLevel::blur_sigma_mm(bool with_resampling) const {
   return level_blur_sigma_in_nodes(level, with_resampling) * node_spacing_mm(field_geometry);
 }
 
-FieldLevelMemory process_memory(int threads) {
-  check(threads >= 1, "at least one thread");
-  return [threads](std::size_t count, const FieldLevelFill& fill) {
-    const std::shared_ptr<std::uint16_t[]> owner =
-        std::make_unique_for_overwrite<std::uint16_t[]>(count);
-    const std::span<std::uint16_t> samples(owner.get(), count);
-    ThreadPool pool(threads);
-    pool.for_each(threads, [&](int part, int /*slot*/) { fill(samples, part, threads); });
-    return SharedArray<std::uint16_t>(owner, samples);
-  };
-}
-
 std::size_t decoded_bytes(const CompressedAttenuationField& field) {
   return static_cast<std::size_t>(field.lattice().tile_count()) * sizeof(Tile);
 }
 
-FieldLevel decode_field(const CompressedAttenuationField& field, const FieldLevelMemory& memory) {
-  return field.codebook.filter ? filtered_level_0(field, memory) : decoded_level(field, 0, memory);
+FieldLevel decode_field(const std::shared_ptr<const CompressedAttenuationField>& field,
+                        const FieldLevelMemory& memory) {
+  return field->codebook.filter ? filtered_level_0(field, memory) : decoded_level(field, 0, memory);
 }
 
-FieldLevel decode_halved_field(const CompressedAttenuationField& field,
+FieldLevel decode_halved_field(const std::shared_ptr<const CompressedAttenuationField>& field,
                                const FieldLevelMemory& memory) {
-  check(field.slabs.size() == 1, "several slabs are merged from their decoded samples");
-  if (field.codebook.filter) return next_field_level(decode_field(field, memory), memory);
-  return decoded_level(field, 1, memory);
+  check(field->slabs.size() == 1, "several slabs are merged from their decoded samples");
+  if (!field->codebook.filter) return decoded_level(field, 1, memory);
+  return next_field_level(std::make_shared<const FieldLevel>(decode_field(field, memory)), memory);
 }
 
-FieldLevel next_field_level(const FieldLevel& level, const FieldLevelMemory& memory) {
-  FieldLevel result{level.level + 1, level.field_geometry, level.quantizer_step, {}};
-  const std::span slabs(level.slabs);
+FieldLevel next_field_level(const std::shared_ptr<const FieldLevel>& level,
+                            const FieldLevelMemory& memory) {
+  FieldLevel result{level->level + 1, level->field_geometry, level->quantizer_step, {}};
   // Level 1 keeps the slabs: with half the nodes they bear half the parallax, in nodes, and so do
   // the merged slabs of all further levels.
-  if (result.level == 1) {
-    for (const FieldLevelSlab& slab : slabs)
-      result.slabs.push_back(halved_slab(slab, result, memory));
-    return result;
-  }
-  for (std::size_t k = 0; k < slabs.size(); k += 2)
-    result.slabs.push_back(
-        k + 1 < slabs.size()
-            ? merged_slab(level.field_geometry, slabs.subspan(k, 2), result, memory)
-            : halved_slab(slabs[k], result, memory));
+  const std::size_t together = result.level == 1 ? 1 : 2;
+  for (std::size_t k = 0; k < level->slabs.size(); k += together)
+    result.slabs.push_back(k + together <= level->slabs.size() && together == 2
+                               ? merged_slab(level, k, memory)
+                               : halved_slab(level, k, memory));
   return result;
 }
 
-FieldLevels make_field_pyramid(const CompressedAttenuationField& field,
+FieldLevels make_field_pyramid(const std::shared_ptr<const CompressedAttenuationField>& field,
                                int coarsest_level,
                                const FieldLevelMemory& memory) {
-  if (field.slabs.size() > 1)
-    return make_field_pyramid(decode_field(field, memory), coarsest_level, memory);
+  if (field->slabs.size() > 1)
+    return make_field_pyramid(
+        std::make_shared<const FieldLevel>(decode_field(field, memory)), coarsest_level, memory);
   check(coarsest_level >= 1, "a pyramid begins at level 1");
   FieldLevels levels{std::make_shared<const FieldLevel>(decode_halved_field(field, memory))};
   append_levels(coarsest_level, memory, levels);
   return levels;
 }
 
-FieldLevels make_field_pyramid(const FieldLevel& level_0,
+FieldLevels make_field_pyramid(const std::shared_ptr<const FieldLevel>& level_0,
                                int coarsest_level,
                                const FieldLevelMemory& memory) {
   check(coarsest_level >= 1, "a pyramid begins at level 1");

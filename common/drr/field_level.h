@@ -2,18 +2,13 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <memory>
-#include <span>
 #include <vector>
 
-#include "base/shared_array.h"
+#include "drr/level_samples.h"
 #include "field/compressed_attenuation_field.h"
 
 namespace af {
-
-/// Zero samples after the last one, so that kernels may load whole vectors.
-inline constexpr std::size_t kFieldLevelPadding = 16;
 
 /// Mean distance (mm) between a field's (s,t) nodes at the plane through the field's centre (y = 0
 /// of the slab frame), averaged over s, t and the slabs.
@@ -30,8 +25,11 @@ int halvings_to_usual_nodes(const LightSlab& light_slab);
 /// One slab of a field that is held as plain 16-bit samples, [u][v][t][s] with s fastest (s runs
 /// along the detector's columns, so a row of viewpoint samples is a row of a DRR).
 struct FieldLevelSlab {
-  SlabGeometry geometry;               ///< this level's (s,t) nodes; stored ranges need not be even
-  SharedArray<std::uint16_t> samples;  ///< kFieldLevelPadding more than the nodes
+  SlabGeometry geometry;  ///< this level's (s,t) nodes; stored ranges need not be even
+  LevelSamples samples;
+  /// The sum of the slab's levels as its codewords have them: how much slabs weigh when they are
+  /// merged.
+  double weight = 0.0;
 
   [[nodiscard]] std::size_t samples_per_viewpoint() const {
     return static_cast<std::size_t>(geometry.stored_s.count) *
@@ -77,43 +75,31 @@ struct FieldLevel {
   [[nodiscard]] double blur_sigma_mm(bool with_resampling = false) const;
 };
 
-/// Fills memory in parts that may run at the same time. Each call gets its number and the number of
-/// parts.
-using FieldLevelFill = std::function<void(std::span<std::uint16_t> samples, int part, int parts)>;
-
-/// Provides memory for `count` samples and has it filled: by one call (samples, 0, 1), by several
-/// threads, or by the ranks of a node together (Communicator::allocate_on_node_together).
-using FieldLevelMemory =
-    std::function<SharedArray<std::uint16_t>(std::size_t count, const FieldLevelFill& fill)>;
-
-/// Memory of this process, filled by `threads` threads.
-FieldLevelMemory process_memory(int threads = 1);
-
 /// Memory of a field's level 0.
 std::size_t decoded_bytes(const CompressedAttenuationField& field);
 
 /// Level 0 of a compressed field: 537 MB for 64x64 x 256x256 nodes, 67 MB for 8x8 x 256x256 in two
-/// slabs.
-FieldLevel decode_field(const CompressedAttenuationField& field,
+/// slabs, of which what is looked at is made.
+FieldLevel decode_field(const std::shared_ptr<const CompressedAttenuationField>& field,
                         const FieldLevelMemory& memory = process_memory());
 
 /// Level 1 of a compressed field of one slab, without the memory of its level 0 unless its codebook
 /// has a filter. InputError when an axis has too few nodes to halve.
-FieldLevel decode_halved_field(const CompressedAttenuationField& field,
+FieldLevel decode_halved_field(const std::shared_ptr<const CompressedAttenuationField>& field,
                                const FieldLevelMemory& memory = process_memory());
 
 /// The level above. InputError when an axis has too few nodes to halve.
-FieldLevel next_field_level(const FieldLevel& level,
+FieldLevel next_field_level(const std::shared_ptr<const FieldLevel>& level,
                             const FieldLevelMemory& memory = process_memory());
 
 using FieldLevels = std::vector<std::shared_ptr<const FieldLevel>>;
 
 /// Levels 1 ... coarsest_level of a compressed field, [0] being level 1; coarsest_level >= 1.
-FieldLevels make_field_pyramid(const CompressedAttenuationField& field,
+FieldLevels make_field_pyramid(const std::shared_ptr<const CompressedAttenuationField>& field,
                                int coarsest_level,
                                const FieldLevelMemory& memory = process_memory());
 /// The same from a field's level 0.
-FieldLevels make_field_pyramid(const FieldLevel& level_0,
+FieldLevels make_field_pyramid(const std::shared_ptr<const FieldLevel>& level_0,
                                int coarsest_level,
                                const FieldLevelMemory& memory = process_memory());
 

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -10,20 +11,18 @@
 
 namespace af {
 
-/// Decodes a field whose codebook has a filter, a few rows of tiles along t at a time: of as many
-/// viewpoints as fields of several slabs have, their coefficients stay in cache. \test
+/// Decodes a field whose codebook has a filter, a tile of viewpoints at a time. \test
 /// FilteredDecoding.EqualsTheDefinition
 class FilteredDecoding {
  public:
-  /// `field` must outlive it.
-  explicit FilteredDecoding(const CompressedAttenuationField& field);
+  explicit FilteredDecoding(std::shared_ptr<const CompressedAttenuationField> field);
 
-  /// Rows begin ... end - 1 of a slab's tiles along t, of every viewpoint, into all samples of the
-  /// slab, [u][v][t][s] as FieldLevelSlab has them. Re-entrant.
-  void decode(std::size_t slab, int begin, int end, std::span<std::uint16_t> samples) const;
+  /// The viewpoints of tile (a, b) of a slab into all samples of the slab, [u][v][t][s] as
+  /// FieldLevelSlab has them. Re-entrant.
+  void decode(std::size_t slab, int a, int b, std::span<std::uint16_t> samples) const;
 
  private:
-  const CompressedAttenuationField& field_;
+  std::shared_ptr<const CompressedAttenuationField> field_;
   std::vector<TileCoefficients> codewords_;  ///< with mean 0
 };
 

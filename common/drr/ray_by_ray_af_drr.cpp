@@ -102,7 +102,7 @@ std::array<Ray, 6> ray_derivatives(const Eigen::Matrix3d& slab_from_room_axes,
 RayByRayAfDrr::RayByRayAfDrr(std::shared_ptr<const CompressedAttenuationField> field,
                              FieldInterpolation interpolation)
     : field_(std::move(field)), interpolation_(interpolation) {
-  if (field_->codebook.filter) decoded_ = decode_field(*field_);
+  if (field_->codebook.filter) decoded_ = decode_field(field_);
 }
 
 std::unique_ptr<RenderWorkspace> RayByRayAfDrr::make_workspace() const {

@@ -59,12 +59,6 @@ double reach_ratio(const LightSlab& field_geometry,
          (field_geometry.uv_plane_y_mm - merged.st_plane_y_mm);
 }
 
-double total_level(const FieldLevelSlab& slab) {
-  const auto samples =
-      std::span<const std::uint16_t>(slab.samples).first(slab.samples.size() - kFieldLevelPadding);
-  return static_cast<double>(std::accumulate(samples.begin(), samples.end(), std::uint64_t{0}));
-}
-
 /// The halved axis of a plane at a weighted mean depth: a ray's positions on the planes are an
 /// affine function of depth, so the edges are, too.
 GridAxis mean_halved_axis(std::span<const FieldLevelSlab> slabs,
@@ -197,11 +191,10 @@ std::uint16_t rounded_sample(float sum) {
 
 }  // namespace
 
-SlabMerging::SlabMerging(const LightSlab& field_geometry, std::span<const FieldLevelSlab> slabs)
-    : v_nodes_(field_geometry.v.nodes) {
+SlabMerging::SlabMerging(const LightSlab& field_geometry, std::span<const FieldLevelSlab> slabs) {
   check(!slabs.empty(), "slabs to merge");
   std::vector<double> weights;
-  for (const FieldLevelSlab& slab : slabs) weights.push_back(total_level(slab) + 1.0);
+  for (const FieldLevelSlab& slab : slabs) weights.push_back(slab.weight + 1.0);
   const double total = std::accumulate(weights.begin(), weights.end(), 0.0);
   for (double& weight : weights) weight /= total;
 
@@ -230,27 +223,19 @@ SlabMerging::SlabMerging(const LightSlab& field_geometry, std::span<const FieldL
                         taps_of(t_maps[k], field_geometry.v, merged_.stored_t)});
 }
 
-void SlabMerging::merge(int begin, int end, std::span<std::uint16_t> samples) const {
-  std::vector<BorderedImage> images;
-  for (const Source& source : sources_) images.emplace_back(source.slab->geometry);
-  const auto count = static_cast<std::size_t>(merged_.stored_s.count) *
-                     static_cast<std::size_t>(merged_.stored_t.count);
-  std::vector<float> sums(count);
+void SlabMerging::merge(int u, int v, std::span<std::uint16_t> samples) const {
+  std::vector<float> sums(samples.size());
   std::vector<float> row;
-  for (int viewpoint = begin; viewpoint < end; ++viewpoint) {
-    const auto at = static_cast<std::size_t>(viewpoint);
-    std::ranges::fill(sums, 0.0f);
-    for (std::size_t k = 0; k < sources_.size(); ++k) {
-      const FieldLevelSlab& slab = *sources_[k].slab;
-      images[k].fill(slab.samples.data() + at * slab.samples_per_viewpoint());
-      add_weighted(images[k],
-                   sources_[k].s[static_cast<std::size_t>(viewpoint / v_nodes_)],
-                   sources_[k].t[static_cast<std::size_t>(viewpoint % v_nodes_)],
-                   row,
-                   sums.data());
-    }
-    std::ranges::transform(sums, samples.data() + at * count, rounded_sample);
+  for (const Source& source : sources_) {
+    BorderedImage image(source.slab->geometry);
+    image.fill(source.slab->samples.viewpoints(u, v));
+    add_weighted(image,
+                 source.s[static_cast<std::size_t>(u)],
+                 source.t[static_cast<std::size_t>(v)],
+                 row,
+                 sums.data());
   }
+  std::ranges::transform(sums, samples.begin(), rounded_sample);
 }
 
 }  // namespace af

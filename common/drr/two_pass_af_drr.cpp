@@ -291,9 +291,8 @@ TwoPassAfDrr::TwoPassAfDrr(std::unique_ptr<const ViewpointBlender> blender,
 TwoPassAfDrr::TwoPassAfDrr(std::shared_ptr<const CompressedAttenuationField> field,
                            const TwoPassOptions& options,
                            std::shared_ptr<ThreadPool> pool)
-    : TwoPassAfDrr(make_viewpoint_blender(std::move(field), options.uv, pool ? pool->threads() : 1),
-                   options,
-                   std::move(pool)) {}
+    : TwoPassAfDrr(make_viewpoint_blender(std::move(field), options.uv), options, std::move(pool)) {
+}
 
 TwoPassAfDrr::TwoPassAfDrr(std::shared_ptr<const FieldLevel> level,
                            const TwoPassOptions& options,

@@ -412,11 +412,12 @@ class LevelBlender final : public AnyBlender {
     block.t_stride = geometry.stored_s.count;
     block.v_stride = static_cast<std::int64_t>(slab.samples_per_viewpoint());
     block.u_stride = block.v_stride * level_->field_geometry.v.nodes;
-    block.samples = slab.samples.data() + scratch.u_taps[first_s].first * block.u_stride +
-                    scratch.v_taps[first_t].first * block.v_stride +
-                    (nodes.t.begin - geometry.stored_t.begin) * block.t_stride +
-                    (nodes.s.begin - geometry.stored_s.begin);
     block.taps = tap_count();
+    block.samples =
+        slab.samples.viewpoints(
+            scratch.u_taps[first_s].first, scratch.v_taps[first_t].first, block.taps, block.taps) +
+        (nodes.t.begin - geometry.stored_t.begin) * block.t_stride +
+        (nodes.s.begin - geometry.stored_s.begin);
     const std::size_t row_length = weight_count(scratch);
     for (std::size_t tap = 0; tap < static_cast<std::size_t>(block.taps); ++tap) {
       block.u_weights[tap] = scratch.u_weights.data() + 2 * tap * row_length + first_s;
@@ -438,10 +439,10 @@ class LevelBlender final : public AnyBlender {
 }  // namespace
 
 std::unique_ptr<const ViewpointBlender> make_viewpoint_blender(
-    std::shared_ptr<const CompressedAttenuationField> field, AxisInterpolation uv, int threads) {
+    std::shared_ptr<const CompressedAttenuationField> field, AxisInterpolation uv) {
   if (field->codebook.filter)
-    return std::make_unique<LevelBlender>(
-        std::make_shared<const FieldLevel>(decode_field(*field, process_memory(threads))), uv);
+    return std::make_unique<LevelBlender>(std::make_shared<const FieldLevel>(decode_field(field)),
+                                          uv);
   return std::make_unique<CompressedBlender>(std::move(field), uv);
 }
 

@@ -59,10 +59,9 @@ class ViewpointBlender {
                      const BlendedImages& images) const = 0;
 };
 
-/// From the codebook's tiles, or, where it has a filter, from samples that `threads` threads decode
-/// first.
+/// From the codebook's tiles, or, where it has a filter, from samples.
 std::unique_ptr<const ViewpointBlender> make_viewpoint_blender(
-    std::shared_ptr<const CompressedAttenuationField> field, AxisInterpolation uv, int threads = 1);
+    std::shared_ptr<const CompressedAttenuationField> field, AxisInterpolation uv);
 /// From decoded samples.
 std::unique_ptr<const ViewpointBlender> make_viewpoint_blender(
     std::shared_ptr<const FieldLevel> level, AxisInterpolation uv);

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <new>
 #include <stdexcept>
+#include <sys/mman.h>
 
 #include "base/error.h"
 #include "base/host_name.h"
@@ -99,11 +100,14 @@ RankFailure plain_failure_of(const std::exception_ptr& error) {
   }
 }
 
-/// Aligned as memory of a node is.
+/// Zeros, page by page as it is touched.
 std::shared_ptr<std::byte> memory_of_process(std::size_t bytes) {
-  constexpr std::align_val_t kAlignment{Communicator::kNodeMemoryAlignment};
-  return {static_cast<std::byte*>(::operator new(bytes, kAlignment)),
-          [](std::byte* memory) { ::operator delete(memory, kAlignment); }};
+  const std::size_t mapped = std::max<std::size_t>(bytes, 1);
+  void* const start =
+      ::mmap(nullptr, mapped, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  if (start == MAP_FAILED) throw std::bad_alloc();
+  return {static_cast<std::byte*>(start),
+          [mapped](std::byte* memory) { ::munmap(memory, mapped); }};
 }
 
 /// Collective over `world`; the same memory for all ranks of `node`.
@@ -231,6 +235,11 @@ Communicator Communicator::node() const {
   return Communicator(impl_->node);
 }
 
+std::shared_ptr<std::byte> Communicator::allocate_on_node(std::size_t bytes) const {
+  if (is_alone(impl_->handle)) return memory_of_process(bytes);
+  return memory_of_node(*this, node(), bytes);
+}
+
 std::shared_ptr<const std::byte> Communicator::allocate_on_node(
     std::size_t bytes, const std::function<void(std::span<std::byte>)>& fill) const {
   return allocate_on_node_together(bytes, [&](std::span<std::byte> memory, int part, int) {
@@ -241,13 +250,12 @@ std::shared_ptr<const std::byte> Communicator::allocate_on_node(
 std::shared_ptr<const std::byte> Communicator::allocate_on_node_together(
     std::size_t bytes,
     const std::function<void(std::span<std::byte>, int part, int parts)>& fill) const {
+  const std::shared_ptr<std::byte> memory = allocate_on_node(bytes);
   if (is_alone(impl_->handle)) {
-    std::shared_ptr<std::byte> memory = memory_of_process(bytes);
     fill(std::span<std::byte>(memory.get(), bytes), 0, 1);
     return memory;
   }
   const Communicator on_node = node();
-  const std::shared_ptr<std::byte> memory = memory_of_node(*this, on_node, bytes);
   // On all nodes: ranks of another node would otherwise go on to a collective call that these ranks
   // never reach.
   all_or_none(*this, [&] {

@@ -47,11 +47,13 @@ class Communicator {
   /// Collective. The ranks that share this rank's memory, a group that lasts as long as MPI does.
   [[nodiscard]] Communicator node() const;
 
-  /// Collective. Memory of `bytes` bytes held once per node, aligned to kNodeMemoryAlignment;
-  /// `fill` runs on each node's first rank only, and all wait for it. An exception in `fill` is
-  /// thrown on every rank of every node. To let go of it is not collective: each process unmaps its
-  /// own view (NodeMemoryFile), and the system frees the memory with the last. So ranks may do it
-  /// in any order, also while an exception unwinds, and none waits.
+  /// Collective. Memory of `bytes` zeros held once per node, aligned to kNodeMemoryAlignment.
+  /// To let go of it is not collective: each process unmaps its own view (NodeMemoryFile), and the
+  /// system frees the memory with the last. So ranks may do it in any order, also while an
+  /// exception unwinds, and none waits.
+  [[nodiscard]] std::shared_ptr<std::byte> allocate_on_node(std::size_t bytes) const;
+  /// Collective. The same, filled: `fill` runs on each node's first rank only, and all wait for it.
+  /// An exception in `fill` is thrown on every rank of every node.
   [[nodiscard]] std::shared_ptr<const std::byte> allocate_on_node(
       std::size_t bytes, const std::function<void(std::span<std::byte>)>& fill) const;
   /// Collective. The same, filled together: `fill` runs on every rank of the node and gets the

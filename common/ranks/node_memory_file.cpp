@@ -22,17 +22,16 @@ FileError failure(const std::string& name, const std::string& what) {
   return {"/dev/shm" + name, what + ": " + std::generic_category().message(errno)};
 }
 
-/// A page that is touched where there is no room ends the process.
-void require_room(int descriptor, std::size_t bytes) {
+InputError no_room(int descriptor, std::size_t bytes) {
   struct statvfs found {};
-  if (fstatvfs(descriptor, &found) != 0 || found.f_blocks == 0) return;
-  const std::size_t room = found.f_bavail * found.f_frsize;
-  if (bytes <= room) return;
+  std::string room;
   constexpr std::size_t kMegabyte = 1000000;
-  throw InputError("memory that the ranks of a node share",
-                   std::to_string(bytes / kMegabyte + 1) + " MB",
-                   "must fit in /dev/shm, which has " + std::to_string(room / kMegabyte) +
-                       " MB left: enlarge it, or use one rank per node");
+  if (fstatvfs(descriptor, &found) == 0)
+    room =
+        ", which has " + std::to_string(found.f_bavail * found.f_frsize / kMegabyte) + " MB left";
+  return {"memory that the ranks of a node share",
+          std::to_string(bytes / kMegabyte + 1) + " MB",
+          "must fit in /dev/shm" + room + ": enlarge it, or use one rank per node"};
 }
 
 }  // namespace
@@ -51,9 +50,10 @@ std::string NodeMemoryFile::create(std::size_t bytes) {
     if (descriptor_ < 0 && errno != EEXIST) throw failure(name, "cannot be made");
   }
   created_ = name;
-  require_room(descriptor_, bytes);
-  if (::ftruncate(descriptor_, static_cast<off_t>(bytes)) != 0)
-    throw failure(name, "cannot be enlarged");
+  // Room for all of it at once: a page that is touched where there is none ends the process.
+  errno = ::posix_fallocate(descriptor_, 0, static_cast<off_t>(std::max<std::size_t>(bytes, 1)));
+  if (errno == ENOSPC || errno == EFBIG) throw no_room(descriptor_, bytes);
+  if (errno != 0) throw failure(name, "cannot be enlarged");
   return name;
 }
 

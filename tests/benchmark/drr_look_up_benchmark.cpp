@@ -129,7 +129,7 @@ void run(const LookUpOptions& of_look_up, const Communicator& world) {
   const View view = View::whole_detector(field->identity.camera);
   const std::vector<RigidTransform> poses = random_poses(*field, options.is_quick ? 2 : 20);
   const std::vector<RigidTransform> few_poses = evenly_spread(poses, 2);
-  const auto samples = std::make_shared<const FieldLevel>(decode_field(*field));
+  const auto samples = std::make_shared<const FieldLevel>(decode_field(field));
   // With a filter, every look-up is in decoded samples: all share these.
   const bool has_filter = field->codebook.filter.has_value();
   const auto renderer = [&](const TwoPassOptions& look_up, int threads = 1) {
@@ -140,7 +140,7 @@ void run(const LookUpOptions& of_look_up, const Communicator& world) {
   const TwoPassAfDrr two_pass = renderer({});
   const TwoPassAfDrr cubic = renderer({AxisInterpolation::Cubic, AxisInterpolation::Linear});
   const TwoPassAfDrr cubic_uv = renderer({AxisInterpolation::Cubic, AxisInterpolation::Cubic});
-  const auto pyramid = make_field_pyramid(*field, 2);
+  const auto pyramid = make_field_pyramid(field, 2);
   const TwoPassAfDrr decoded(samples);
   const TwoPassAfDrr cubic_sum(samples, {.sums_on_more_nodes = true});
   const TwoPassAfDrr half(pyramid[0]);

@@ -56,7 +56,8 @@ std::shared_ptr<const FieldLevel> cast_level(const BenchmarkCase& benchmark_case
             samples[viewpoint * per_viewpoint + node] = *from++;
           }
   }
-  level->slabs[0].samples = SharedArray<std::uint16_t>(std::move(samples));
+  level->slabs[0].samples =
+      LevelSamples({light_slab.u.nodes, light_slab.v.nodes, per_viewpoint}, std::move(samples));
   return level;
 }
 
@@ -200,7 +201,7 @@ void run(const CaseOptions& options, const std::string& field_path, const Commun
   for (const Way& way : all_ways(field, cast_level(benchmark_case)))
     results[way.name] = report(way, poses, references, cast_gradients, view, pivot);
   // Levels of the field against those of ray casting, which blur the CT by as much.
-  for (const auto& level : make_field_pyramid(*field, 2)) {
+  for (const auto& level : make_field_pyramid(field, 2)) {
     const RayCastDrr blurred(blurred_volume(*benchmark_case.volume(), level->blur_sigma_mm(true)));
     const View coarse = view.coarser(1 << level->level);
     std::vector<Image2d> blurred_references;

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ct/blurred_volume.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "base/vector_width.h"
 #include "support/ct_phantoms.h"
 
 namespace af {
@@ -39,12 +42,15 @@ std::array<double, 3> moments_along(const AttenuationVolume& volume, std::size_t
   return moments;
 }
 
-TEST(VolumeBlur, SpreadsAVoxelByTheVariance) {
-  constexpr double kSigmaMm = 3.2;
+constexpr double kSigmaMm = 3.2;
+
+/// `blur`: by kSigmaMm, rounding `roundings` times.
+template <typename Blur>
+void expect_variance(int roundings, const Blur& blur) {
   const std::array<int, 3> factors{2, 1, 1};  // 1.6 / 0.8, / 1.1 and / 2.5, rounded down
   // Rounding to integers of 33767: half a unit at up to 14 voxels to both sides, beyond which 4
   // sigma have passed on every axis.
-  constexpr double kRoundedVoxels2 = 2 * 0.5 * (14.0 * 15.0 * 29.0 / 6.0) / 33767.0;
+  const double rounded_voxels2 = roundings * 2 * 0.5 * (14.0 * 15.0 * 29.0 / 6.0) / 33767.0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     // A plane one voxel thick, in every phase of the coarse voxels.
     std::array<double, 3> sums{};
@@ -56,7 +62,7 @@ TEST(VolumeBlur, SpreadsAVoxelByTheVariance) {
       std::array<int, 3> last{kSide - 1, kSide - 1, kSide - 1};
       first[axis] = last[axis] = 14 + phase;
       const AttenuationVolume fine(box_phantom(uneven_grid(), first, last, kLargestHu), {});
-      const auto coarse = blurred_volume(fine, kSigmaMm);
+      const auto coarse = blur(fine);
       fine_mm = fine.grid().spacing_mm[static_cast<Eigen::Index>(axis)];
       coarse_mm = coarse->grid().spacing_mm[static_cast<Eigen::Index>(axis)];
       EXPECT_NEAR(coarse_mm, factors[axis] * fine_mm, 1e-12);
@@ -68,12 +74,36 @@ TEST(VolumeBlur, SpreadsAVoxelByTheVariance) {
     }
     const double mean_mm = sums[1] / sums[0];
     const double variance_mm2 = sums[2] / sums[0] - mean_mm * mean_mm;
-    EXPECT_NEAR(mean_mm, 0.0, kRoundedVoxels2 * fine_mm) << axis;
+    EXPECT_NEAR(mean_mm, 0.0, rounded_voxels2 * fine_mm) << axis;
     // Linear interpolation of voxels h apart adds h^2 / 6 on both sides.
     EXPECT_NEAR(variance_mm2 + coarse_mm * coarse_mm / 6.0,
                 kSigmaMm * kSigmaMm + fine_mm * fine_mm / 6.0,
-                kRoundedVoxels2 * fine_mm * fine_mm)
+                rounded_voxels2 * fine_mm * fine_mm)
         << axis;
+  }
+}
+
+TEST(VolumeBlur, SpreadsAVoxelByTheVariance) {
+  expect_variance(1, [](const AttenuationVolume& fine) { return blurred_volume(fine, kSigmaMm); });
+}
+
+TEST(VolumeBlur, OfABlurredVolumeSpreadsAVoxelByTheVarianceOfBoth) {
+  constexpr double kBelowMm = 1.6;
+  expect_variance(2, [](const AttenuationVolume& fine) {
+    return blurred_volume(*blurred_volume(fine, kBelowMm), kSigmaMm, kBelowMm);
+  });
+}
+
+/// Of every width the same bits, of sizes that fill no vector.
+TEST(VolumeBlur, EveryVectorWidthGivesTheSameBits) {
+  const AttenuationVolume fine(box_phantom(uneven_grid(), {3, 4, 5}, {27, 24, 19}, 300), {});
+  for (const double sigma_mm : {0.9, 2.7}) {
+    const auto expected = blurred_volume(fine, sigma_mm);
+    for (const VectorWidth width : supported_vector_widths()) {
+      force_vector_width(width);
+      EXPECT_TRUE(std::ranges::equal(blurred_volume(fine, sigma_mm)->voxels(), expected->voxels()));
+    }
+    force_vector_width(std::nullopt);
   }
 }
 

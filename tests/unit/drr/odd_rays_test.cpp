@@ -34,7 +34,7 @@ struct NamedRenderer {
 /// Every way of looking up, of the field and, where it can be, of its decoded samples.
 std::vector<NamedRenderer> look_ups(const std::shared_ptr<CompressedAttenuationField>& field) {
   std::vector<NamedRenderer> found;
-  const auto decoded = std::make_shared<const FieldLevel>(decode_field(*field));
+  const auto decoded = std::make_shared<const FieldLevel>(decode_field(field));
   for (const std::string& look_up : field_look_up_names()) {
     found.push_back({look_up, make_field_renderer(field, look_up), field});
     if (look_up != "nearest" && look_up != "quadrilinear")

@@ -64,7 +64,9 @@ FieldLevel cast_level(const AttenuationVolume& volume) {
         samples.push_back(static_cast<std::uint16_t>(std::lround(value / level.quantizer_step)));
     }
   samples.resize(samples.size() + kFieldLevelPadding);
-  level.slabs.push_back({slab, SharedArray<std::uint16_t>(std::move(samples))});
+  const SampleExtent extent{
+      level.field_geometry.u.nodes, level.field_geometry.v.nodes, image.size()};
+  level.slabs.push_back({slab, LevelSamples(extent, std::move(samples))});
   return level;
 }
 
@@ -124,7 +126,7 @@ TEST(RayCastLevel, DrrAndDerivativesAgreeWithTheFieldsLevel) {
   const auto at_level_0 = compare(TwoPassAfDrr(sharp), ray_cast, view);
   auto level = sharp;
   for (int i = 1; i <= 2; ++i) {
-    level = std::make_shared<const FieldLevel>(next_field_level(*level));
+    level = std::make_shared<const FieldLevel>(next_field_level(level));
     const RayCastDrr blurred(blurred_volume(*volume, level->blur_sigma_mm(true)));
     const auto products = compare(TwoPassAfDrr(level), blurred, view);
     // How much a level's blur changes a DRR, and how far renderers may differ in it. The field

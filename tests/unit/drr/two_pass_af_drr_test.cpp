@@ -66,7 +66,7 @@ TEST(TwoPassAfDrr, EveryVectorWidthGivesTheSameBits) {
     for (const int slabs : {1, 2}) {
       const auto field = small_field(waves, slabs, 7, 51);
       const TwoPassAfDrr compressed(field, options);
-      const TwoPassAfDrr level(make_field_pyramid(*field, 1).front(), options);
+      const TwoPassAfDrr level(make_field_pyramid(field, 1).front(), options);
       // Pixels 1, 1.5 and 4 times as far apart as nodes: kernels read these in different ways.
       const View whole = View::whole_detector(small_camera());
       View apart = whole;
@@ -135,7 +135,7 @@ TEST(TwoPassAfDrr, LevelsOfMeanRemovedTilesAreLimited) {
     const auto expected = of_field(RayByRayAfDrr(field, FieldInterpolation::Quadrilinear));
     for (const VectorWidth width : supported_vector_widths()) {
       force_vector_width(width);
-      const FieldLevel decoded = decode_field(*field);
+      const FieldLevel decoded = decode_field(field);
       for (const std::uint16_t sample : decoded.slabs[0].samples.view().first(24 * 24))
         ASSERT_TRUE(static_cast<float>(sample) * field->quantizer_step == low ||
                     static_cast<float>(sample) * field->quantizer_step == high);
@@ -150,7 +150,7 @@ TEST(TwoPassAfDrr, LevelsOfMeanRemovedTilesAreLimited) {
 
 TEST(FieldRenderer, ADecodedFieldIsLookedUpAsTheFieldIs) {
   const auto field = small_field(waves, 2, 6, 24);
-  const auto decoded = std::make_shared<const FieldLevel>(decode_field(*field));
+  const auto decoded = std::make_shared<const FieldLevel>(decode_field(field));
   const View view = View::whole_detector(small_camera());
   const RigidTransform pose = pose_from_parameters({}, small_pose(3));
   std::vector<Image2d> images;
@@ -175,7 +175,7 @@ TEST(TwoPassAfDrr, AnyNumberOfThreadsGivesTheSameBits) {
   const RigidTransform pose = pose_from_parameters({}, small_pose(8));
   for (const TwoPassOptions& options : {kLinear, kCubicSum, kCubicInSt}) {
     const auto field = small_field(waves, 2, 7, 41);
-    const auto level = make_field_pyramid(*field, 1).front();
+    const auto level = make_field_pyramid(field, 1).front();
     const TwoPassAfDrr alone(field, options);
     const TwoPassAfDrr level_alone(level, options);
     for (const int threads : {2, 5}) {
@@ -195,7 +195,7 @@ TEST(TwoPassAfDrr, AWorkspaceLeavesNoTrace) {
   for (const TwoPassOptions& options : {kLinear, kCubicSum, kCubic}) {
     const auto field = small_field(waves, 2, 7, 41);
     const TwoPassAfDrr renderer(field, options);
-    const TwoPassAfDrr level(make_field_pyramid(*field, 1).front(), options);
+    const TwoPassAfDrr level(make_field_pyramid(field, 1).front(), options);
     const View view{small_camera(), {4, 3, 20, 18}};
     const auto workspace = renderer.make_workspace();
     for (std::uint64_t i = 0; i < 20; ++i) {
@@ -259,7 +259,7 @@ TEST(TwoPassAfDrr, GradientsAgreeWithCentralDifferences) {
     for (const int slabs : {1, 2}) {
       const auto field = small_field(waves, slabs, 7, 41);
       const TwoPassAfDrr fine(field, options);
-      const TwoPassAfDrr level(make_field_pyramid(*field, 1).front(), options);
+      const TwoPassAfDrr level(make_field_pyramid(field, 1).front(), options);
       for (const TwoPassAfDrr* renderer : {&fine, &level}) {
         const View view{small_camera(), {3, 2, 20, 15}};
         const RigidTransform pose = pose_from_parameters({}, small_pose(6));
@@ -326,8 +326,8 @@ TEST(TwoPassAfDrr, CroppedFieldEqualsOneThatStoresItsZeros) {
     for (const TwoPassOptions& options : {kLinear, kCubic}) {
       const TwoPassAfDrr expected(whole, options);
       const TwoPassAfDrr renderer(cropped, options);
-      const TwoPassAfDrr level(std::make_shared<const FieldLevel>(decode_field(*cropped)), options);
-      const TwoPassAfDrr level_of_whole(std::make_shared<const FieldLevel>(decode_field(*whole)),
+      const TwoPassAfDrr level(std::make_shared<const FieldLevel>(decode_field(cropped)), options);
+      const TwoPassAfDrr level_of_whole(std::make_shared<const FieldLevel>(decode_field(whole)),
                                         options);
       for (std::uint64_t i = 0; i < 30; ++i) {
         const RigidTransform pose = pose_from_parameters({}, small_pose(i));

@@ -61,7 +61,7 @@ TEST(Allocation, NoneIsMadeByALookUpOnceItsWorkspaceIsWarm) {
         TwoPassOptions{AxisInterpolation::Cubic},
         TwoPassOptions{AxisInterpolation::Cubic, AxisInterpolation::Cubic}}) {
     const TwoPassAfDrr compressed(field, options, pool);
-    const TwoPassAfDrr level(make_field_pyramid(*field, 1).front(), options, pool);
+    const TwoPassAfDrr level(make_field_pyramid(field, 1).front(), options, pool);
     for (const TwoPassAfDrr* renderer : {&compressed, &level}) {
       const auto workspace = renderer->make_workspace();
       const auto render_all = [&] {

@@ -87,14 +87,15 @@ FittedFilter fit_of(const Codebook& codebook, const std::vector<WorkUnit>& patch
 
 /// Over nodes that are not empty as decoded, of the third of tiles that are fitted.
 double squared_error_of(const CompressedAttenuationField& field) {
-  const FieldLevel decoded = decode_field(field);
+  const FieldLevel decoded =
+      decode_field(std::make_shared<const CompressedAttenuationField>(field));
   double sum = 0.0;
   std::size_t next = 0;
   for (int u = 0; u < kUv; ++u)
     for (int v = 0; v < kUv; ++v)
       for (int t = 0; t < kSt; ++t)
         for (int s = 0; s < kSt; ++s) {
-          const double level = decoded.slabs[0].samples[next++];
+          const double level = decoded.slabs[0].samples.view()[next++];
           const bool is_fitted = (u / 2 + v / 2 + s / 2 + t / 2) % 3 == 0;
           if (level > 0.0 && is_fitted) sum += std::pow(level - level_at(u, v, s, t), 2.0);
         }
