@@ -126,7 +126,7 @@ struct RegistrationCase::Impl {
   /// `is_diagnosed`: X-rays that do not fit are looked into, as af-register does for its best end.
   Registration run(const af::RigidTransform& start, std::int64_t start_index, bool is_diagnosed) {
     registration::RegistrationRecord record = registration->run(start, start_index);
-    if (is_diagnosed) registration::diagnose(problem, record);
+    if (is_diagnosed) registration->diagnose(record);
     const registration::RegistrationResult& result = record.result;
     const auto judgement = registration::judgement_of(record);
     Registration found;

@@ -173,26 +173,27 @@ void add_target_errors(const CaseToRegister& registered, std::vector<Registratio
 /// Rank 0. Writes what was found, the summary last.
 void write_results(const RegisterOptions& options,
                    const CaseToRegister& registered,
-                   const std::shared_ptr<const RegistrationProblem>& problem,
                    const RunDescription& description,
                    const Communicator& world,
+                   Registration& registration,
                    std::vector<RegistrationRecord>& records,
                    RunFolder& folder) {
   add_target_errors(registered, records);
   RegistrationRecord& best = records[best_record(records)];
-  diagnose(problem, best);
+  registration.diagnose(best);
   warn_of(best.diagnosis.messages, world);
   warn_of_clipped(records, world);
   const bool is_found = judgement_of(best).verdict != Verdict::NotFound;
+  const RegistrationProblem& problem = *registration.problem;
   const std::filesystem::path slicer = options.output_folder / "slicer";
   // Before result.json: when that is there, everything is.
   if (is_found)
-    write_slicer_folder(*problem, best.result.room_from_ct, registered.of, slicer);
+    write_slicer_folder(problem, best.result.room_from_ct, registered.of, slicer);
   else
-    remove_slicer_files(*problem, slicer);  // an earlier run's
+    remove_slicer_files(problem, slicer);  // an earlier run's
   if (registered.landmarks.has_value())
     std::cout << residuals_text(*registered.landmarks, registered.of);
-  std::cout << write_run(records, *problem, description, options.output_folder);
+  std::cout << write_run(records, problem, description, options.output_folder);
   folder.finish();
   if (!is_found)
     throw NotFoundError("no pose was found (see the verdict); the results of the search are in " +
@@ -248,7 +249,7 @@ void run_registration(const RegisterOptions& options,
                         deciding_values(deciding_options(in_force), description.provenance.inputs)),
       world);
   do_on_root(world, [&] {
-    write_results(options, registered, problem, description, world, records, folder);
+    write_results(options, registered, description, world, registration, records, folder);
   });
 }
 

@@ -458,7 +458,7 @@ void Run::run_portfolio() {
 Registration::Registration(std::shared_ptr<const RegistrationProblem> of_problem,
                            const RegistrationOptions& by_method,
                            const std::shared_ptr<ThreadPool>& threads)
-    : problem(std::move(of_problem)), method(by_method) {
+    : problem(std::move(of_problem)), method(by_method), diagnoser_(problem, threads) {
   check(problem != nullptr, "a registration needs a problem");
   throw_if_any(problems(method));
   throw_if_any(problems(*problem));
@@ -528,12 +528,9 @@ ObjectiveValue Registration::similarity_at(const RigidTransform& room_from_ct) {
                            : stages.back().value_at(*problem, room_from_ct);
 }
 
-void diagnose(const std::shared_ptr<const RegistrationProblem>& problem,
-              RegistrationRecord& record) {
-  const RegistrationResult& result = record.result;
-  if (!record.view_values.empty() && result.evaluations > 0)
-    record.diagnosis =
-        diagnose_views(problem, result.start_room_from_ct, result.room_from_ct, record.view_values);
+void Registration::diagnose(RegistrationRecord& record) {
+  if (!record.view_values.empty() && record.result.evaluations > 0)
+    record.diagnosis = diagnoser_.diagnosis(record.view_values);
 }
 
 Judgement judgement_of(const RegistrationRecord& record) {

@@ -32,7 +32,7 @@ struct RegistrationRecord {
   RegistrationResult result;
   std::vector<ViewValue> view_values;  ///< of PoseExaminer, at the end
   UncertaintyReport uncertainty;       ///< of UncertaintyEstimator, likewise
-  ViewDiagnosis diagnosis;             ///< where X-rays were looked into: diagnose()
+  ViewDiagnosis diagnosis;             ///< where X-rays were looked into: Registration::diagnose()
   std::optional<TargetErrors> errors;  ///< when the gold pose is known
 
   /// What the registration itself found; the rest is derived from it.
@@ -77,6 +77,8 @@ class Registration {
   /// search(), and what examiner and uncertainty say of its end.
   [[nodiscard]] RegistrationRecord run(const RigidTransform& start_room_from_ct,
                                        std::int64_t start_index = 0);
+  /// Looks into X-rays that do not fit the end of a record of run() (ViewDiagnoser).
+  void diagnose(RegistrationRecord& record);
 
   /// The value of RegistrationResult::similarity at a pose.
   [[nodiscard]] ObjectiveValue similarity_at(const RigidTransform& room_from_ct);
@@ -85,11 +87,8 @@ class Registration {
   std::vector<View> views_;
   std::vector<Eigen::Vector3d> step_points_ct_;
   OptimizerResult found_;  ///< reused
+  ViewDiagnoser diagnoser_;
 };
-
-/// Looks into X-rays that do not fit the end (diagnose_views()).
-void diagnose(const std::shared_ptr<const RegistrationProblem>& problem,
-              RegistrationRecord& record);
 
 /// The verdict on a record: at least doubtful where the diagnosis found something.
 Judgement judgement_of(const RegistrationRecord& record);

@@ -26,12 +26,6 @@ std::string percent_text(double share) {
                               : "nothing";
 }
 
-/// A change of the X-rays, not made, with which a pose would explain far more of them.
-struct Remedy {
-  std::string text;  ///< "the X-ray of view 'B' mirrored left-right"
-  std::vector<ViewValue> view_values;
-};
-
 /// The mean coarse value, NaN counting as 0.
 double mean_of(const std::vector<ViewValue>& values) {
   double sum = 0.0;
@@ -134,43 +128,36 @@ std::optional<RegistrationOptions> coarse_options(const RegistrationProblem& pro
   return options;
 }
 
-/// The best values that the changed problem comes to; none when it cannot be registered.
+/// The values of the pose to which the changed problem comes from the nominal one; none when it
+/// cannot be registered, or when one of them is certainly lower than a found pose has.
 std::optional<std::vector<ViewValue>> values_with(const Change& change,
                                                   const RegistrationProblem& problem,
                                                   const RegistrationOptions& options,
-                                                  const std::vector<RigidTransform>& starts) {
+                                                  const std::shared_ptr<ThreadPool>& threads) {
   const auto changed = std::make_shared<RegistrationProblem>(problem);
   change.make(*changed);
-  std::optional<std::vector<ViewValue>> best;
   try {
-    Registration registration(changed, options);
-    PoseExaminer examiner(*changed, 0.0);
-    for (const RigidTransform& start : starts) {
-      std::vector<ViewValue> values = examiner.view_values(registration.search(start).room_from_ct);
-      if (!best.has_value() || mean_of(values) > mean_of(*best)) best = std::move(values);
-    }
+    Registration registration(changed, options, threads);
+    const RegistrationResult end = registration.search(changed->nominal_room_from_ct);
+    // The judge of the chains' ends says the mean of the coarse values.
+    if (!(end.similarity >= kLeastCoarseOfFound)) return std::nullopt;
+    return PoseExaminer(*changed, 0.0).view_values(end.room_from_ct);
   } catch (const InputError&) {  // an X-ray without gradients
     return std::nullopt;
   }
-  return best;
 }
 
-std::optional<Remedy> remedy_of(const RegistrationProblem& problem,
-                                const std::vector<RigidTransform>& starts,
-                                const std::vector<ViewValue>& view_values) {
-  // Changes are tried over the whole region, whose values do not compare with those in silhouettes.
-  for (const ViewValue& value : view_values)
-    if (value.in_silhouette) return std::nullopt;
+std::optional<Remedy> best_remedy(const RegistrationProblem& problem,
+                                  const std::shared_ptr<ThreadPool>& threads) {
   const auto options = coarse_options(problem);
   if (!options.has_value()) return std::nullopt;
   std::optional<Remedy> best;
   for (const Change& change : changes_of(problem)) {
-    auto values = values_with(change, problem, *options, starts);
+    auto values = values_with(change, problem, *options, threads);
     if (!values.has_value() || lowest_of(*values, &ViewValue::coarse) < kLeastCoarseOfFound)
       continue;
-    const double least =
-        best.has_value() ? mean_of(best->view_values) : mean_of(view_values) + kLeastGain;
-    if (mean_of(*values) > least) best = Remedy{change.text, std::move(*values)};
+    if (!best.has_value() || mean_of(*values) > mean_of(best->view_values))
+      best = Remedy{change.text, std::move(*values)};
   }
   return best;
 }
@@ -194,32 +181,34 @@ void append_same_xrays(const RegistrationProblem& problem, std::vector<std::stri
 
 }  // namespace
 
-ViewDiagnosis diagnose_views(const std::shared_ptr<const RegistrationProblem>& problem,
-                             const RigidTransform& start_room_from_ct,
-                             const RigidTransform& room_from_ct,
-                             const std::vector<ViewValue>& view_values) {
+ViewDiagnoser::ViewDiagnoser(std::shared_ptr<const RegistrationProblem> problem,
+                             std::shared_ptr<ThreadPool> threads)
+    : problem_(std::move(problem)), threads_(std::move(threads)) {}
+
+ViewDiagnosis ViewDiagnoser::diagnosis(const std::vector<ViewValue>& view_values) {
   ViewDiagnosis diagnosis;
-  append_same_xrays(*problem, diagnosis.messages);
+  append_same_xrays(*problem_, diagnosis.messages);
   const bool has_copy = !diagnosis.messages.empty();
   for (std::size_t i = 0; i < view_values.size(); ++i) {
     if (disagrees(i, view_values))
-      diagnosis.messages.push_back("view '" + problem->views[i].view.camera.name +
+      diagnosis.messages.push_back("view '" + problem_->views[i].view.camera.name +
                                    "' does not agree with the others: shares of the X-rays' "
                                    "gradients that the pose explains: " +
-                                   shares_text(*problem, view_values));
+                                   shares_text(*problem_, view_values));
   }
   const bool is_sound = lowest_of(view_values, &ViewValue::coarse) >= kLeastCoarseOfFound &&
                         lowest_of(view_values, &ViewValue::fine) >= kLeastFineOfFound;
   // No change mends a copy: what seems to is a body's symmetry.
   if (is_sound || has_copy) return diagnosis;
-  // Mirrored, a shaft is still a shaft, so silhouettes of bones would fit changed X-rays too.
-  const bool in_silhouettes = std::ranges::any_of(view_values, &ViewValue::in_silhouette);
-  if (in_silhouettes) return diagnosis;
-  const auto remedy = remedy_of(*problem, {start_room_from_ct, room_from_ct}, view_values);
-  if (remedy.has_value())
+  // Mirrored, a shaft is still a shaft, so silhouettes of bones would fit changed X-rays too; and
+  // changes are tried over the whole region, whose values do not compare with those in silhouettes.
+  if (std::ranges::any_of(view_values, &ViewValue::in_silhouette)) return diagnosis;
+  if (!remedy_.has_value()) remedy_ = best_remedy(*problem_, threads_);
+  const std::optional<Remedy>& remedy = *remedy_;
+  if (remedy.has_value() && mean_of(remedy->view_values) > mean_of(view_values) + kLeastGain)
     diagnosis.messages.push_back(
-        remedy->text + " would explain more: " + shares_text(*problem, remedy->view_values) +
-        " instead of " + shares_text(*problem, view_values));
+        remedy->text + " would explain more: " + shares_text(*problem_, remedy->view_values) +
+        " instead of " + shares_text(*problem_, view_values));
   return diagnosis;
 }
 

@@ -2,10 +2,12 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "base/thread_pool.h"
 #include "register/method/registration_result.h"
 #include "register/problem/registration_problem.h"
 #include "register/verdict/verdict.h"
@@ -17,16 +19,38 @@ struct ViewDiagnosis {
   std::vector<std::string> messages;  ///< one for each thing found, for people; empty: nothing
 };
 
-/// Looks at the values that PoseExaminer gave the views at `room_from_ct`. Where one of them is
-/// low, the X-rays are tried inverted, mirrored left-right and up-down, turned by 180 degrees and
-/// exchanged, one change at a time, each with a coarse registration from the start and from the
-/// end. Reports a change that would explain far more; values within silhouettes are not compared.
-/// Always reports views with the same X-ray. Nothing of `problem` changes.
-/// \test ViewDiagnosis.NamesTheViewAndWhatWouldMendIt
-ViewDiagnosis diagnose_views(const std::shared_ptr<const RegistrationProblem>& problem,
-                             const RigidTransform& start_room_from_ct,
-                             const RigidTransform& room_from_ct,
-                             const std::vector<ViewValue>& view_values);
+/// A change of the X-rays, not made, and what a pose would explain of them with it.
+struct Remedy {
+  std::string text;  ///< "the X-ray of view 'B' mirrored left-right"
+  std::vector<ViewValue> view_values;
+};
+
+/// Looks into the X-rays of a case where they do not fit the ends of its registrations. Nothing of
+/// the case changes. For one thread at a time.
+/// \test ViewDiagnoser.NamesTheViewAndWhatWouldMendIt
+class ViewDiagnoser {
+ public:
+  /// `threads`: none means the calling thread alone.
+  explicit ViewDiagnoser(std::shared_ptr<const RegistrationProblem> problem,
+                         std::shared_ptr<ThreadPool> threads = nullptr);
+
+  /// `view_values`: of PoseExaminer, at an end. Where one of them is low, reports the change of
+  /// X-rays that explains most, if that is far more than this end does; values within silhouettes
+  /// are not compared. Always reports views with the same X-ray.
+  ///
+  /// The X-rays are tried inverted, mirrored left-right and up-down, turned by 180 degrees and
+  /// exchanged, one change at a time, each with a coarse registration from the nominal pose: what
+  /// comes of it depends on the case alone, neither on the end nor on those diagnosed before, and
+  /// is kept from the first time that it is needed.
+  /// \test ViewDiagnoser.TriesChangesOncePerCase
+  [[nodiscard]] ViewDiagnosis diagnosis(const std::vector<ViewValue>& view_values);
+
+ private:
+  std::shared_ptr<const RegistrationProblem> problem_;
+  std::shared_ptr<ThreadPool> threads_;
+  /// None: not yet looked for. Holding none: no change lets a pose explain enough of every view.
+  std::optional<std::optional<Remedy>> remedy_;
+};
 
 /// The judgement of a registration in the light of a diagnosis of its views: at least doubtful
 /// where that found something. Its reason also tells of a clipped start.

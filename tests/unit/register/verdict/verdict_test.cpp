@@ -3,8 +3,11 @@
 #include "register/verdict/verdict.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <functional>
+#include <memory>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -188,15 +191,25 @@ TEST(PoseExaminer, DoesNotJudgeAnXrayWithoutGradients) {
   EXPECT_TRUE(std::isnan(values[1].coarse));
 }
 
-/// All that is said about a case whose X-rays `harm` changed, from a start beside the gold pose.
-std::string sayings_of(const std::function<void(RegistrationProblem&)>& harm) {
-  const test::SmallCase small = case_with_levels();
+std::vector<ViewValue> values_at_gold(const test::SmallCase& small) {
+  return PoseExaminer(*small.problem, 0.0).view_values(small.gold_room_from_ct);
+}
+
+/// A case whose X-rays `harm` changed, its nominal pose beside the gold one.
+test::SmallCase harmed_case(const std::function<void(RegistrationProblem&)>& harm) {
+  test::SmallCase small = case_with_levels();
+  small.problem->nominal_room_from_ct = beside_gold(small, 1.0);
   harm(*small.problem);
+  return small;
+}
+
+/// All that is said about such a case at the gold pose.
+std::string sayings_of(const std::function<void(RegistrationProblem&)>& harm) {
+  const test::SmallCase small = harmed_case(harm);
   std::string text;
-  const auto values = PoseExaminer(*small.problem, 0.0).view_values(small.gold_room_from_ct);
-  const ViewDiagnosis diagnosis =
-      diagnose_views(small.problem, beside_gold(small, 1.0), small.gold_room_from_ct, values);
-  for (const std::string& saying : diagnosis.messages) text += saying + '\n';
+  for (const std::string& saying :
+       ViewDiagnoser(small.problem).diagnosis(values_at_gold(small)).messages)
+    text += saying + '\n';
   return text;
 }
 
@@ -211,7 +224,7 @@ void flip_columns(Image2d& image) {
   }
 }
 
-TEST(ViewDiagnosis, NamesTheViewAndWhatWouldMendIt) {
+TEST(ViewDiagnoser, NamesTheViewAndWhatWouldMendIt) {
   struct Defect {
     const char* expected;
     std::function<void(Image2d&)> make;
@@ -238,7 +251,7 @@ TEST(ViewDiagnosis, NamesTheViewAndWhatWouldMendIt) {
     }
 }
 
-TEST(ViewDiagnosis, NamesNoRemedyForNoise) {
+TEST(ViewDiagnoser, NamesNoRemedyForNoise) {
   const std::string text = sayings_of([](RegistrationProblem& problem) {
     HashRandom random(3, 0);
     for (float& value : problem.views[1].xray.pixels)
@@ -248,7 +261,7 @@ TEST(ViewDiagnosis, NamesNoRemedyForNoise) {
   EXPECT_EQ(text.find("would explain more"), std::string::npos) << text;
 }
 
-TEST(ViewDiagnosis, NamesExchangedXraysAndTheSameXrayTwice) {
+TEST(ViewDiagnoser, NamesExchangedXraysAndTheSameXrayTwice) {
   const std::string exchanged = sayings_of([](RegistrationProblem& problem) {
     std::swap(problem.views[0].xray, problem.views[1].xray);
   });
@@ -259,8 +272,56 @@ TEST(ViewDiagnosis, NamesExchangedXraysAndTheSameXrayTwice) {
   EXPECT_NE(same.find("views 'AP' and 'LAT' have the same X-ray"), std::string::npos) << same;
 }
 
-TEST(ViewDiagnosis, SaysNothingOfSoundXrays) {
+TEST(ViewDiagnoser, SaysNothingOfSoundXrays) {
   EXPECT_EQ(sayings_of([](RegistrationProblem&) {}), "");
+}
+
+/// Counts its DRRs.
+class CountedDrr final : public DrrRenderer {
+ public:
+  explicit CountedDrr(std::shared_ptr<const DrrRenderer> renderer)
+      : renderer_(std::move(renderer)) {}
+
+  RenderStatus render(const RigidTransform& room_from_ct,
+                      const View& view,
+                      RenderWorkspace& workspace,
+                      std::span<float> total_attenuation,
+                      const std::optional<PoseGradients>& gradients) const override {
+    ++drrs;
+    return renderer_->render(room_from_ct, view, workspace, total_attenuation, gradients);
+  }
+  [[nodiscard]] std::unique_ptr<RenderWorkspace> make_workspace() const override {
+    return renderer_->make_workspace();
+  }
+  [[nodiscard]] const char* name() const override { return renderer_->name(); }
+  mutable std::atomic<int> drrs = 0;
+
+ private:
+  std::shared_ptr<const DrrRenderer> renderer_;
+};
+
+TEST(ViewDiagnoser, TriesChangesOncePerCase) {
+  const test::SmallCase small =
+      harmed_case([](RegistrationProblem& problem) { turn(problem.views[1].xray); });
+  const auto counted = std::make_shared<const CountedDrr>(small.problem->views[1].renderer);
+  small.problem->views[1].renderer = counted;
+  const std::vector<ViewValue> sound = {{0.9, 0.8}, {0.9, 0.8}};
+  const std::vector<ViewValue> worse = {{0.2, 0.1}, {0.1, 0.1}};
+  const std::vector<ViewValue> at_gold = values_at_gold(small);
+  ViewDiagnoser diagnoser(small.problem);
+  const int before = counted->drrs;
+  EXPECT_TRUE(diagnoser.diagnosis(sound).messages.empty());
+  EXPECT_EQ(counted->drrs, before);
+  const std::vector<std::string> said_of_worse = diagnoser.diagnosis(worse).messages;
+  const int after = counted->drrs;
+  EXPECT_GT(after, before);
+  ASSERT_EQ(said_of_worse.size(), 1U);
+  EXPECT_NE(said_of_worse[0].find("'LAT' turned by 180 degrees"), std::string::npos);
+  // Of every end it says what it would have said of it first.
+  const std::vector<std::string> said_of_gold = diagnoser.diagnosis(at_gold).messages;
+  EXPECT_EQ(counted->drrs, after);
+  EXPECT_EQ(said_of_gold, ViewDiagnoser(small.problem).diagnosis(at_gold).messages);
+  EXPECT_NE(said_of_gold, said_of_worse);
 }
 
 }  // namespace
