@@ -45,8 +45,9 @@ int main(int argc, char** argv) {
   CLI::App app{
       "Finds the pose of a CT in the room from calibrated X-rays (2D-3D registration).\n"
       "Writes result.json, pose.toml, result.tfm (ct_from_room, for Slicer), one overlay picture "
-      "per view, slicer/ (a folder that 3D Slicer loads) and reproduce.sh; with --starts also "
-      "registrations.csv. A verdict says whether the pose is found, doubtful or not found. "
+      "per view, slicer/ (a folder that 3D Slicer loads; --no-pictures leaves out both) and "
+      "reproduce.sh; with --starts also registrations.csv. A verdict says whether the pose is "
+      "found, doubtful or not found. "
       "When it is not found for every start, the exit code is 7, and result.tfm, pose.toml and "
       "slicer/ are not written."};
   af::cli::bind_options(app, options);

@@ -60,6 +60,7 @@ void RegisterOptions::describe(Fields& field) {
         skip_ct_check,
         "Do not read the CT (it may be absent): fields are trusted to be of this case");
   field.part(resume);
+  field.part(pictures);
   field("output", output_folder, "Folder for the results")
       .as("-o,--output")
       .stands_for(PathRole::OutputFolder)

@@ -11,6 +11,7 @@
 #include "register/case_loading.h"
 #include "register/field_paths.h"
 #include "register/method/method_options.h"
+#include "register/results/picture_options.h"
 #include "register/verdict/uncertainty_estimator.h"
 
 namespace af::registration {
@@ -34,6 +35,7 @@ struct RegisterOptions {
   XrayBeamOptions beam;
   bool skip_ct_check = false;
   cli::ResumeOptions resume;
+  PictureOptions pictures;
   std::filesystem::path output_folder;
 
   void describe(Fields& field);

@@ -130,7 +130,8 @@ RunDescription description_of(const RegisterOptions& in_force,
                               const LoadedCase& loaded,
                               const std::string& command_line,
                               const Communicator& world) {
-  RunDescription description{registered.of.name, in_force.renderer, {}, {}};
+  RunDescription description{
+      registered.of.name, in_force.renderer, {}, {}, !in_force.pictures.are_left_out};
   if (registered.landmarks.has_value())
     description.landmarks = to_json(*registered.landmarks, registered.of);
   description.provenance = {"af-register",
@@ -187,7 +188,7 @@ void write_results(const RegisterOptions& options,
   const RegistrationProblem& problem = *registration.problem;
   const std::filesystem::path slicer = options.output_folder / "slicer";
   // Before result.json: when that is there, everything is.
-  if (is_found)
+  if (is_found && description.has_pictures)
     write_slicer_folder(problem, best.result.room_from_ct, registered.of, slicer);
   else
     remove_slicer_files(problem, slicer);  // an earlier run's

@@ -547,14 +547,14 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
   // The starts go before the rows come: memory has room for only one of the two.
   evaluation.starts.starts = {};
   do_on_root(world, [&] {
-    if (!options.has_no_pictures)
+    if (!options.pictures.are_left_out)
       draw_pictures(options, study_case, methods.front(), rows.front(), yardstick, evaluation);
   });
   // Fields and CT go before the rows come: memory has room for only one of the two. Only fields
   // that the next case uses, too, stay (KeptFields).
   methods.clear();
   do_on_root(world, [&] {
-    if (!options.has_no_pictures) draw_setting(options, study, study_case, evaluation);
+    if (!options.pictures.are_left_out) draw_setting(options, study, study_case, evaluation);
     const WorkNote note("reading the rows of case " + study_case.name, WorkNote::Kind::Phase);
     for (const MethodRows& method : rows)
       evaluation.traces[method.renderer] = add_rows(method, all_rows);

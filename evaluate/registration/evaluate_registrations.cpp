@@ -371,11 +371,7 @@ void describe_starts(Fields& field, RegistrationStudyOptions& options) {
         options.is_starts_only,
         "Write starts.csv, for other programs, and register nothing")
       .not_recorded("without registrations nothing records options");
-  field("no_pictures",
-        options.has_no_pictures,
-        "Neither figures nor overlays nor settings nor folders for 3D Slicer, some 15 MB and a "
-        "second per case: "
-        "for batches of many runs");
+  field.part(options.pictures);
   field("only_start",
         options.only_start,
         "Register from this start alone, its start_index in starts.csv, by every renderer: repeats "
@@ -518,7 +514,7 @@ void run_registration(const RegistrationStudyOptions& options,
                     drawn_starts_table(summary["cases"], summary["renderers"]).to_text());
     run.finish(summary, provenance);
     print_outcome(summary, folder, world);
-    if (!options.has_no_pictures) draw_results({folder.string()}, world);
+    if (!options.pictures.are_left_out) draw_results({folder.string()}, world);
   });
 }
 

@@ -12,6 +12,7 @@
 #include "evaluate/registration/evaluated_methods.h"
 #include "evaluate/starts/perturbed_starts.h"
 #include "evaluate/statistics/success_rate.h"
+#include "register/results/picture_options.h"
 #include "register/verdict/uncertainty_estimator.h"
 
 namespace af::evaluation {
@@ -29,10 +30,10 @@ struct RegistrationStudyOptions : MethodOptions {
   std::string start_rule = "stratified";           ///< or "uniform", "within-range"
   std::filesystem::path starts_from;               ///< starts.csv instead of drawn ones
   bool is_starts_only = false;                     ///< write starts.csv and register nothing
-  bool has_no_pictures = false;                    ///< neither overlays nor folders for Slicer
-  std::optional<std::int64_t> only_start;          ///< of the table of starts, by every renderer
-  std::filesystem::path poses_from;                ///< poses that another program found
-  std::string method_name = "poses";               ///< what these are called
+  registration::PictureOptions pictures;
+  std::optional<std::int64_t> only_start;  ///< of the table of starts, by every renderer
+  std::filesystem::path poses_from;        ///< poses that another program found
+  std::string method_name = "poses";       ///< what these are called
   double equivalence_margin_mm = 0.1;
   double success_tre_mm = kSuccessTreMm;
   cli::ResumeOptions resume;

@@ -438,10 +438,13 @@ void write_result_files(const RegistrationRecord& record,
       verdict == Verdict::Found ? "" : std::string(" (") + to_string(verdict) + ")";
   const std::vector<std::string> overlays = overlay_file_names(problem);
   for (std::size_t i = 0; i < overlays.size(); ++i)
-    write_overlay(problem.views[i],
-                  record.result.room_from_ct,
-                  run.case_name + ", view " + problem.views[i].view.camera.name + label,
-                  folder / overlays[i]);
+    if (run.has_pictures)
+      write_overlay(problem.views[i],
+                    record.result.room_from_ct,
+                    run.case_name + ", view " + problem.views[i].view.camera.name + label,
+                    folder / overlays[i]);
+    else
+      remove_output(folder / overlays[i]);
   write_results_last(folder / "result.json", result_json(record, problem, run), run.provenance);
 }
 

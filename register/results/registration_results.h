@@ -26,6 +26,7 @@ struct RunDescription {
   std::string renderer;  ///< "field" or "raycast"
   Provenance provenance;
   nlohmann::json landmarks;  ///< what gave the start, with residuals; null: another start
+  bool has_pictures = true;  ///< --no-pictures: neither overlays nor slicer/
 };
 
 /// result.json: verdict, poses as 4x4 (`room_from_ct`, which read_pose() reads) and as six
@@ -54,7 +55,8 @@ void write_overlay(const RegistrationView& view,
 
 /// result.json, pose.toml, result.tfm, VIEW-overlay.png and reproduce.sh in `folder`, result.json
 /// last: when it is there, all are. A result that is "not found" gets no result.tfm, and
-/// rejected-pose.toml instead of pose.toml, so that no script takes its pose for a result.
+/// rejected-pose.toml instead of pose.toml, so that no script takes its pose for a result. Without
+/// pictures, an earlier run's overlays go. \test ResultFiles.WithoutPicturesNoneAreLeft
 void write_result_files(const RegistrationRecord& record,
                         const RegistrationProblem& problem,
                         const RunDescription& run,

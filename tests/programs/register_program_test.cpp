@@ -116,6 +116,26 @@ TEST_F(RegisterProgram, RegistersByFieldAndByRayCasting) {
   EXPECT_NE(provenance.at("input_notes").at("xray AP"), "");
 }
 
+TEST_F(RegisterProgram, DrawsNoPicturesWhereNoneAreWanted) {
+  const std::string command =
+      "--renderer raycast --preset fast --start-rotation-deg -1,0.5,2.5 -o " + path("pictures");
+  const auto rest_of = [&] {
+    nlohmann::json found = result("pictures");
+    found.erase("provenance");
+    found.erase("seconds");
+    return found;
+  };
+  ASSERT_EQ(run_register(command).exit_code, 0);
+  const std::vector<std::string> drawn = {"AP-overlay.png", "LAT-overlay.png", "slicer"};
+  for (const std::string& name : drawn) EXPECT_TRUE(fs::exists(path("pictures/" + name))) << name;
+  const nlohmann::json with_pictures = rest_of();
+  ASSERT_EQ(run_register("--no-pictures " + command).exit_code, 0);
+  for (const std::string& name : drawn) EXPECT_FALSE(fs::exists(path("pictures/" + name))) << name;
+  for (const char* name : {"pose.toml", "result.tfm", "reproduce.sh"})
+    EXPECT_TRUE(fs::exists(path("pictures/" + std::string(name)))) << name;
+  EXPECT_EQ(rest_of(), with_pictures);
+}
+
 TEST_F(RegisterProgram, LooksAFieldUpAsItIsMeantToBe) {
   const std::string cubic_fields = make_fields("-cubic", "--uv-nodes 24 --look-up cubic");
   // The fields hold the same samples. Levels above 0 are looked up linearly.

@@ -102,6 +102,20 @@ TEST(ResultFiles, PosesReadBackAndNothingUnfinishedRemains) {
     EXPECT_EQ(entry.path().string().find("partial"), std::string::npos) << entry.path();
 }
 
+TEST(ResultFiles, WithoutPicturesNoneAreLeft) {
+  const test::ScratchFolder folder;
+  const test::SmallCase small = test::small_case();
+  RunDescription run = some_run();
+  write_result_files(record_of(0, 1.5), *small.problem, run, folder.path());
+  ASSERT_TRUE(std::filesystem::exists(folder / "AP-overlay.png"));
+  run.has_pictures = false;
+  write_result_files(record_of(0, 1.5), *small.problem, run, folder.path());
+  for (const std::string& name : overlay_file_names(*small.problem))
+    EXPECT_FALSE(std::filesystem::exists(folder / name)) << name;
+  for (const char* name : {"result.json", "pose.toml", "result.tfm", "reproduce.sh"})
+    EXPECT_TRUE(std::filesystem::exists(folder / name)) << name;
+}
+
 TEST(ResultFiles, JsonTellsTheRunAndWritesNullForWhatDoesNotExist) {
   const test::SmallCase small = test::small_case();
   const double nan = std::numeric_limits<double>::quiet_NaN();

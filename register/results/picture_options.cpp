@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "register/results/picture_options.h"
+
+namespace af::registration {
+
+void PictureOptions::describe(Fields& field) {
+  field("no_pictures",
+        are_left_out,
+        "Neither pictures nor folders for 3D Slicer, of af-evaluate some 15 MB and a second per "
+        "case: for batches of many runs")
+      .not_deciding("registrations are the same");
+}
+
+}  // namespace af::registration
