@@ -5,6 +5,7 @@
 #include <cstring>
 #include <new>
 #include <numbers>
+#include <png.h>
 #include <stdexcept>
 #include <string_view>
 
@@ -49,6 +50,23 @@ std::vector<std::string> characters_of(std::string_view text) {
     i += std::max<std::size_t>(length, 1);
   }
   return characters;
+}
+
+/// Red, green and blue, row by row, of a surface that is drawn.
+std::vector<png_byte> rgb_pixels(cairo_surface_t* surface) {
+  const int width = cairo_image_surface_get_width(surface);
+  const int height = cairo_image_surface_get_height(surface);
+  const std::ptrdiff_t stride = cairo_image_surface_get_stride(surface);
+  const unsigned char* data = cairo_image_surface_get_data(surface);
+  std::vector<png_byte> rgb;
+  rgb.reserve(std::size_t{3} * static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      std::uint32_t color = 0;
+      std::memcpy(&color, data + y * stride + std::ptrdiff_t{4} * x, sizeof color);
+      for (const int shift : {16, 8, 0}) rgb.push_back(static_cast<png_byte>(color >> shift));
+    }
+  return rgb;
 }
 
 }  // namespace
@@ -127,14 +145,20 @@ void Canvas::set_pixels(const Area& area, const std::function<std::uint32_t(int,
 
 std::string Canvas::png() {
   check_status();
-  std::string bytes;
-  const auto append = [](void* target, const unsigned char* data, unsigned length) {
-    static_cast<std::string*>(target)->append(reinterpret_cast<const char*>(data), length);
-    return CAIRO_STATUS_SUCCESS;
-  };
-  const cairo_status_t status = cairo_surface_write_to_png_stream(surface_.get(), append, &bytes);
-  if (status != CAIRO_STATUS_SUCCESS)
-    throw std::runtime_error(std::string("cairo: ") + cairo_status_to_string(status));
+  cairo_surface_flush(surface_.get());
+  png_image image = {};
+  image.version = PNG_IMAGE_VERSION;
+  image.width = static_cast<png_uint_32>(cairo_image_surface_get_width(surface_.get()));
+  image.height = static_cast<png_uint_32>(cairo_image_surface_get_height(surface_.get()));
+  image.format = PNG_FORMAT_RGB;
+  // cairo's own writer takes three times as long for files that are a fifth smaller.
+  image.flags = PNG_IMAGE_FLAG_FAST;
+  const std::vector<png_byte> pixels = rgb_pixels(surface_.get());
+  png_alloc_size_t length = PNG_IMAGE_PNG_SIZE_MAX(image);
+  std::string bytes(length, '\0');
+  if (png_image_write_to_memory(&image, bytes.data(), &length, 0, pixels.data(), 0, nullptr) == 0)
+    throw std::runtime_error(std::string("libpng: ") + image.message);
+  bytes.resize(length);
   return bytes;
 }
 
