@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "base/joined.h"
 #include "base/number_text.h"
+#include "ct/ct_facts.h"
 #include "drr/opened_field.h"
 #include "files/sha256.h"
 #include "geometry/camera_distance.h"
@@ -328,6 +329,18 @@ NodeCt read_node_ct(const StudyCase& study_case,
   });
 }
 
+/// Collective. What fields are checked against.
+CtFacts read_facts(const StudyCase& study_case,
+                   const CaseLoadOptions& options,
+                   const Communicator& communicator,
+                   std::vector<std::string>& warnings) {
+  auto facts = on_root(communicator, [&] {
+    return read_ct_facts(study_case.ct, study_case.ct_reading, options.attenuation, warnings);
+  });
+  return naming_study_line(
+      study_case.places, "ct", [&] { return std::move(facts).share().take(); });
+}
+
 }  // namespace
 
 const char* to_string(RendererKind kind) {
@@ -362,10 +375,7 @@ LoadedCase load_case(const Study& study,
     volumes = cast_volumes(node_ct.volume, options, communicator);
     ray_cast = ray_cast_through(volumes, options.ray_caster, options);
   } else if (!options.skip_ct_check) {
-    ct = naming_study_line(study_case.places, "ct", [&] {
-      return read_ct_facts(
-          study_case.ct, study_case.ct_reading, options.attenuation, communicator, loaded.warnings);
-    });
+    ct = read_facts(study_case, options, communicator, loaded.warnings);
   }
   if (ct.has_value())
     all_or_none(communicator, [&] { require_target_in_ct(study_case, ct->grid); });

@@ -65,13 +65,13 @@ struct LoadedCase {
 /// Collective. Everything a registration of one case needs, with the same content on every rank:
 /// X-rays and masks (on every rank), fields or the CT's attenuation, and their coarser levels, held
 /// once per node. The levels of ray casting are the CT, blurred as the levels of fields blur DRRs.
-/// With fields, only rank 0 reads the CT, for its hash and grid (skip_ct_check: nobody does; steps
-/// are then scaled as if it filled 200 mm about the ROI centre), unless a correction casts rays
-/// through it: its attenuation must then equal the fields' (InputError). FileError (exit 4) when a
-/// field was made from another CT than the case's, or than the first field, or misses rays of a
-/// view's widest region at the nominal pose; InputError when a view has no field. A field for
-/// another camera is accepted: at every pose its rays decide, and a note says how far the camera is
-/// from the field's and what is covered.
+/// With fields, only rank 0 looks at the CT, for its hash and grid (read_ct_facts(); skip_ct_check:
+/// nobody does; steps are then scaled as if it filled 200 mm about the ROI centre), unless a
+/// correction casts rays through it: its attenuation must then equal the fields' (InputError).
+/// FileError (exit 4) when a field was made from another CT than the case's, or than the first
+/// field, or misses rays of a view's widest region at the nominal pose; InputError when a view has
+/// no field. A field for another camera is accepted: at every pose its rays decide, and a note says
+/// how far the camera is from the field's and what is covered.
 LoadedCase load_case(const Study& study,
                      const StudyCase& study_case,
                      const CaseLoadOptions& options,

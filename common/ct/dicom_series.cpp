@@ -55,17 +55,6 @@ std::array<double, N> required(const DicomElements& header, DicomTag tag, const 
   return result;
 }
 
-std::vector<fs::path> files_of(const fs::path& folder) {
-  std::vector<fs::path> files;
-  std::error_code error;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
-       entry.increment(error))
-    if (std::error_code ignored; entry->is_regular_file(ignored)) files.push_back(entry->path());
-  if (error) throw FileError(folder.string(), "cannot be listed: " + error.message());
-  std::sort(files.begin(), files.end());
-  return files;
-}
-
 void warn(std::vector<std::string>* warnings, const std::string& message) {
   if (warnings != nullptr) warnings->push_back(message);
 }
@@ -484,6 +473,17 @@ class VoxelCollector {
 };
 
 }  // namespace
+
+std::vector<fs::path> files_of(const fs::path& folder) {
+  std::vector<fs::path> files;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error))
+    if (std::error_code ignored; entry->is_regular_file(ignored)) files.push_back(entry->path());
+  if (error) throw FileError(folder.string(), "cannot be listed: " + error.message());
+  std::sort(files.begin(), files.end());
+  return files;
+}
 
 bool holds_dicom(const fs::path& folder) {
   const std::vector<fs::path> files = files_of(folder);

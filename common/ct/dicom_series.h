@@ -17,6 +17,9 @@ struct DicomCt {
   HuValues values;  ///< rescaled, i fastest, slices ascending along the slice normal
 };
 
+/// The regular files that stand in a folder itself, by name. FileError when it cannot be listed.
+std::vector<std::filesystem::path> files_of(const std::filesystem::path& folder);
+
 /// True when a folder holds at least one DICOM file.
 bool holds_dicom(const std::filesystem::path& folder);
 

@@ -7,7 +7,6 @@
 #include <tuple>
 
 #include "base/error.h"
-#include "ct/cut_faces.h"
 #include "drr/bone_volume.h"
 #include "ranks/root_only.h"
 #include "study/target_place.h"
@@ -27,17 +26,6 @@ struct FoundInCt {
         std::tie(bordered.size, bordered.origin_mm, bordered.spacing_mm, bordered.direction));
   }
 };
-
-/// Collective.
-Shared<FoundInCt> found_in(const RootOnly<CtVolume>& read, const AttenuationModel& model) {
-  return read
-      .then([&](const CtVolume& ct) {
-        const AttenuatingBox box = attenuating_box(ct, model);
-        return FoundInCt{{ct.grid, identity_of(ct), cut_points(ct, model, box)},
-                         bordered_grid(ct.grid, box)};
-      })
-      .share();
-}
 
 }  // namespace
 
@@ -87,21 +75,16 @@ NodeCt read_ct_per_node(const std::filesystem::path& path,
                         const Communicator& communicator,
                         std::vector<std::string>& warnings) {
   const auto ct = on_root(communicator, [&] { return read_ct(path, options, &warnings); });
-  const Shared<FoundInCt> found = found_in(ct, model);
+  const Shared<FoundInCt> found =
+      ct.then([&](const CtVolume& read) {
+          const AttenuatingBox box = attenuating_box(read, model);
+          return FoundInCt{facts_of(read, model, box), bordered_grid(read.grid, box)};
+        }).share();
   const auto fill = [&](std::span<std::uint16_t> voxels) {
     AttenuationVolume::fill_voxels(ct.value(), model, found->bordered, voxels);
   };
   return {volume_per_node(found->bordered, model, VoxelSource::Root, fill, communicator),
           found->facts};
-}
-
-CtFacts read_ct_facts(const std::filesystem::path& path,
-                      const CtReadOptions& options,
-                      const AttenuationModel& model,
-                      const Communicator& communicator,
-                      std::vector<std::string>& warnings) {
-  const auto ct = on_root(communicator, [&] { return read_ct(path, options, &warnings); });
-  return found_in(ct, model)->facts;
 }
 
 }  // namespace af

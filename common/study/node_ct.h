@@ -7,27 +7,15 @@
 #include <memory>
 #include <span>
 #include <string>
-#include <tuple>
 #include <vector>
 
 #include "ct/attenuation_volume.h"
+#include "ct/ct_facts.h"
 #include "ct/ct_reader.h"
 #include "ranks/communicator.h"
 #include "study/study_file.h"
 
 namespace af {
-
-/// What is known of a CT without its voxels.
-struct CtFacts {
-  CtGrid grid;
-  CtIdentity identity;
-  std::vector<Eigen::Vector3d> cut_points_ct;  ///< see cut_points()
-
-  auto members() {
-    return std::tie(
-        grid.size, grid.origin_mm, grid.spacing_mm, grid.direction, identity, cut_points_ct);
-  }
-};
 
 /// The attenuation of a CT, held once per node.
 struct NodeCt {
@@ -63,12 +51,5 @@ std::shared_ptr<const AttenuationVolume> volume_per_node(
 /// InputError when there is none.
 std::shared_ptr<const AttenuationVolume> bone_per_node(const AttenuationVolume& volume,
                                                        const Communicator& communicator);
-
-/// Collective. Rank 0 reads the CT for its grid, identity and cuts.
-CtFacts read_ct_facts(const std::filesystem::path& path,
-                      const CtReadOptions& options,
-                      const AttenuationModel& model,
-                      const Communicator& communicator,
-                      std::vector<std::string>& warnings);
 
 }  // namespace af

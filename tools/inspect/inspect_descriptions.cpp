@@ -4,7 +4,7 @@
 #include <map>
 #include <set>
 
-#include "ct/ct_reader.h"
+#include "ct/ct_facts.h"
 #include "drr/field_coverage.h"
 #include "files/csv_table.h"
 #include "files/json_text.h"
@@ -14,6 +14,7 @@
 #include "study/pose_file.h"
 #include "study/rig_file.h"
 #include "study/study_file.h"
+#include "study/target_place.h"
 #include "study/xray_reader.h"
 #include "tools/inspect/inspect_kinds.h"
 #include "xray/image_file.h"
@@ -140,7 +141,10 @@ ordered_json case_json(const StudyCase& study_case,
   json["ct"] = study_case.ct.string();
   if (const std::string reading = study_case.ct_reading.text(); !reading.empty())
     json["ct_reading"] = reading;
-  const CtIdentity ct = identity_of(read_case_ct(study_case, &warnings));
+  const CtFacts ct = naming_study_line(study_case.places, "ct", [&] {
+    return read_ct_facts(study_case.ct, study_case.ct_reading, {}, warnings);
+  });
+  require_target_in_ct(study_case, ct.grid);
   json["center_ct_mm"] = vector_json(study_case.center_ct_mm);
   for (Eigen::Index row = 0; row < 4; ++row)
     json["nominal_room_from_ct"].push_back(
@@ -150,7 +154,7 @@ ordered_json case_json(const StudyCase& study_case,
   json["fiducials"] = study_case.fiducials_ct_mm.size();
   json["has_gold_pose"] = study_case.gold_room_from_ct.has_value();
   for (const StudyView& view : study_case.views)
-    json["views"].push_back(view_json(study_case, view, rig, ct, warnings));
+    json["views"].push_back(view_json(study_case, view, rig, ct.identity, warnings));
   return json;
 }
 

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ct/ct_facts.h"
+
+#include <optional>
+#include <system_error>
+
+#include "base/build_info.h"
+#include "base/number_text.h"
+#include "base/stored_bytes.h"
+#include "ct/ct_reader.h"
+#include "ct/cut_faces.h"
+#include "ct/dicom_series.h"
+#include "files/input_guard.h"
+#include "files/sha256.h"
+#include "files/user_cache.h"
+#include "images/dicom_elements.h"
+#include "images/image_header.h"
+
+namespace af {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+/// Of what a file becomes: to be raised when voxels, grid, facts or warnings of a CT that is read
+/// already change. Beside it stand version and commit, which do not tell changes apart that are not
+/// committed, and the library knows no commit.
+constexpr int kReaderVersion = 1;
+
+/// What is kept of a CT. Warnings name the path.
+struct KeptFacts {
+  CtFacts facts;
+  std::vector<std::string> warnings;
+
+  auto members() { return std::tie(facts, warnings); }
+};
+
+/// The names of the files that read_ct() looks at, each with the hash of its bytes, or without one
+/// where it is skipped. None when the path is not of a CT, which read_ct() says.
+std::optional<std::vector<std::string>> names_and_hashes(const fs::path& path) {
+  std::vector<std::string> found;
+  const auto add = [&](const fs::path& file, bool is_read) {
+    found.push_back(file.string());
+    found.push_back(is_read ? sha256_of_file(file.string()) : "");
+  };
+  if (std::error_code error; fs::is_directory(path, error)) {
+    for (const fs::path& file : files_of(path))
+      add(file, is_marked_dicom(file) || may_be_bare_dicom(file));
+    return found;
+  }
+  const std::optional<ImageFormat> format = sniff_image_format(path);
+  if (format != ImageFormat::MetaImage && format != ImageFormat::Nifti &&
+      format != ImageFormat::Nrrd)
+    return std::nullopt;
+  add(path, true);
+  if (const fs::path data_file = read_image_header(path, *format).data_file; data_file != path)
+    add(data_file, true);
+  return found;
+}
+
+/// Under which the facts are kept: what they follow from, hashed.
+std::optional<std::string> key_of(const fs::path& path,
+                                  const CtReadOptions& options,
+                                  const AttenuationModel& model) {
+  const auto files = names_and_hashes(path);
+  if (!files) return std::nullopt;
+  const std::vector<std::string> how = {"facts of a CT",
+                                        std::to_string(kReaderVersion),
+                                        std::string(program_version()),
+                                        std::string(program_commit()),
+                                        path.string(),
+                                        number_text(model.mu_water_per_mm),
+                                        std::to_string(model.air_below_hu)};
+  Sha256 hash;
+  hash.update(bytes_of(how));
+  hash.update(bytes_of(options));
+  hash.update(bytes_of(*files));
+  return hash.hex_digest();
+}
+
+}  // namespace
+
+CtFacts facts_of(const CtVolume& ct, const AttenuationModel& model, const AttenuatingBox& box) {
+  return {ct.grid, identity_of(ct), cut_points(ct, model, box)};
+}
+
+CtFacts read_ct_facts(const fs::path& path,
+                      const CtReadOptions& options,
+                      const AttenuationModel& model,
+                      std::vector<std::string>& warnings) {
+  note_input(path);
+  const std::optional<std::string> key = key_of(path, options, model);
+  std::optional<KeptFacts> kept = key ? cached<KeptFacts>(*key) : std::nullopt;
+  if (!kept) {
+    kept.emplace();
+    const CtVolume ct = read_ct(path, options, &kept->warnings);
+    kept->facts = facts_of(ct, model, attenuating_box(ct, model));
+    // Meanwhile the files may have been written anew.
+    if (key && key_of(path, options, model) == key) keep_in_cache(*key, *kept);
+  }
+  warnings.insert(warnings.end(), kept->warnings.begin(), kept->warnings.end());
+  return kept->facts;
+}
+
+}  // namespace af
