@@ -35,12 +35,14 @@ struct KeptFacts {
   auto members() { return std::tie(facts, warnings); }
 };
 
-/// The names of the files that read_ct() looks at, each with the hash of its bytes, or without one
-/// where it is skipped. None when the path is not of a CT, which read_ct() says.
+/// The names of the files that read_ct() looks at, each with the hash of its bytes, and noted as an
+/// input, or without a hash where it is skipped. None when the path is not of a CT, which read_ct()
+/// says.
 std::optional<std::vector<std::string>> names_and_hashes(const fs::path& path) {
   std::vector<std::string> found;
   const auto add = [&](const fs::path& file, bool is_read) {
     found.push_back(file.string());
+    if (is_read) note_input(file);
     found.push_back(is_read ? sha256_of_file(file.string()) : "");
   };
   if (std::error_code error; fs::is_directory(path, error)) {

@@ -7,5 +7,5 @@ af_add_test(
   LIBS af_ct af_test_itk_caster)
 af_add_test(
   ct_reader_test
-  SOURCES unit/ct/ct_identity_test.cpp unit/ct/ct_reader_test.cpp unit/ct/ct_test_data.cpp
+  SOURCES unit/ct/ct_facts_test.cpp unit/ct/ct_identity_test.cpp unit/ct/ct_reader_test.cpp unit/ct/ct_test_data.cpp
   LIBS af_study ZLIB::ZLIB)

@@ -16,6 +16,7 @@
 #include "programs/small_study.h"
 #include "study/pose_file.h"
 #include "study/rig_file.h"
+#include "support/own_cache.h"
 #include "support/run_program.h"
 #include "support/test_paths.h"
 #include "xray/image_file.h"
@@ -378,6 +379,43 @@ TEST_F(RegisterProgram, RefusesAFieldOfAnotherCtAndNamesBothHashes) {
   const test::ProgramRun unchecked = test::run_command(command + " --skip-ct-check");
   EXPECT_EQ(unchecked.exit_code, 0) << unchecked.output;
   EXPECT_NE(unchecked.output.find("warning"), std::string::npos) << unchecked.output;
+}
+
+TEST_F(RegisterProgram, EndsTheSameAndRefusesTheSameWhereItKnowsTheCtFromBefore) {
+  const test::OwnCache cache;
+  const test::ScratchFolder other;
+  for (const char* name : {"study.toml", "rig.toml", "ct.nii.gz", "AP.mha", "LAT.mha"})
+    fs::copy_file(path(name), other / name);
+  const auto run = [&] {
+    return test::run_command(program("af-register") + " --study " +
+                             (other / "study.toml").string() + fields() +
+                             " --max-evaluations 20 -o " + (other / "out").string());
+  };
+  /// Of the same command, but for times.
+  const auto ended = [&] {
+    fs::remove_all(other / "out");
+    const test::ProgramRun registered = run();
+    EXPECT_EQ(registered.exit_code, 0) << registered.output;
+    nlohmann::json json = nlohmann::json::parse(read_text_file(other / "out/result.json"));
+    json.erase("seconds");
+    json["provenance"].erase("started_utc");
+    return json;
+  };
+  const nlohmann::json first = ended();
+  const auto entries = cache.entries();
+  EXPECT_EQ(entries.size(), 1U);
+  EXPECT_EQ(ended(), first);
+  EXPECT_EQ(cache.entries(), entries) << "the CT was read again";
+  CtVolume moved = test::five_ellipsoids();
+  moved.grid.origin_mm.x() += 7.0;
+  CtVolume scaled = test::five_ellipsoids();
+  scaled.grid.spacing_mm *= 1.1;
+  for (const CtVolume& ct : {moved, scaled}) {
+    fs::remove_all(other / "out");
+    write_ct(ct, other / "ct.nii.gz");
+    for (int time = 0; time < 2; ++time) expect_refused(run(), 4, "mm off");
+  }
+  EXPECT_EQ(cache.entries().size(), 3U);
 }
 
 TEST_F(RegisterProgram, RefusesAFieldOfACtThatLiesElsewhereButNotOfOneInAnotherFormat) {
