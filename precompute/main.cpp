@@ -18,7 +18,10 @@ int main(int argc, char** argv) {
   af::cli::bind_options(app, options);
   af::cli::bind_run_limits(app);
   const std::string command = af::cli::command_line(argc, argv);
-  return af::cli::app_main(app, argc, argv, [&](const af::Communicator& world) {
-    af::run_precompute(options, command, world);
-  });
+  return af::cli::app_main(
+      app,
+      argc,
+      argv,
+      [&](const af::Communicator& world) { af::run_precompute(options, command, world); },
+      [&] { return !options.is_dry_run; });
 }

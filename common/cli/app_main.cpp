@@ -27,6 +27,7 @@
 #include "cli/usage_message.h"
 #include "files/output_lock.h"
 #include "files/shell_words.h"
+#include "ranks/launcher.h"
 #include "ranks/mpi_environment.h"
 #include "ranks/stop_request.h"
 #include "ranks/work_watch.h"
@@ -95,7 +96,7 @@ bool asks_for_help(const CLI::ParseError& error) {
 }
 
 int print_help(const CLI::App& app, const CLI::ParseError& error) {
-  if (MpiEnvironment::is_first_process()) app.exit(error, std::cout, std::cerr);
+  if (is_first_process()) app.exit(error, std::cout, std::cerr);
   return with_output_written(app, static_cast<int>(ExitCode::Done));
 }
 
@@ -117,6 +118,15 @@ std::string reason_text(const RankFailure& failure) {
   constexpr std::chrono::seconds kPatience{5};
   if (!has_reported) std::this_thread::sleep_for(kPatience);
   MpiEnvironment::abort(exit_code);
+}
+
+/// Ends a process that would repeat the work of others.
+void refuse_lone_task(const CLI::App& app) {
+  const std::string problem = lone_task_problem();
+  if (problem.empty()) return;
+  const bool is_reporting = is_first_process();
+  if (is_reporting) std::cerr << app.get_name() << ": " << problem << std::endl;
+  end_after_report(static_cast<int>(ExitCode::Usage), is_reporting);
 }
 
 /// From the watchdog's thread.
@@ -155,12 +165,19 @@ class OnLeaving {
 int app_main(CLI::App& app,
              int argc,
              char** argv,
-             const std::function<void(const Communicator&)>& run) {
+             const std::function<void(const Communicator&)>& run,
+             const std::function<bool()>& needs_mpi) {
   // A write beyond a limit of file sizes is an error to report, not a signal to die from. MPI
   // itself writes files.
   std::signal(SIGXFSZ, SIG_IGN);
   std::optional<WaitAlarm> alarm;  // outlives MPI
   std::optional<MpiEnvironment> environment;
+  const auto join_job = [&](bool writes_by_mpi) {
+    refuse_lone_task(app);
+    if (!writes_by_mpi && !is_launched()) return Communicator::alone();
+    environment.emplace(argc, argv);
+    return Communicator::world();
+  };
   app.name(program_name(argv[0]));
   app.set_version_flag("--version", app.get_name() + " " + std::string(program_version()));
   add_help_formats(app);
@@ -170,11 +187,9 @@ int app_main(CLI::App& app,
     check_option_values(app);
   } catch (const CLI::ParseError& error) {
     if (asks_for_help(error)) return print_help(app, error);
-    environment.emplace(argc, argv);
-    return refuse_usage(app, error, Communicator::world());
+    return refuse_usage(app, error, join_job(false));
   }
-  environment.emplace(argc, argv);
-  const Communicator world = Communicator::world();
+  const Communicator world = join_job(needs_mpi && needs_mpi());
   std::optional<StallWatch> watch;
   const double stall_minutes = run_limits().stall_minutes;
   if (stall_minutes > 0.0) {
@@ -189,7 +204,7 @@ int app_main(CLI::App& app,
   RankFailure failure;
   bool is_known_everywhere = false;
   try {
-    require_threads(environment->thread_level());
+    if (environment) require_threads(environment->thread_level());
     run(world);
     return with_output_written(app, static_cast<int>(ExitCode::Done));
   } catch (const RemoteError& error) {

@@ -21,8 +21,8 @@ class Communicator {
  public:
   /// All ranks of the job. Requires a live MpiEnvironment.
   static Communicator world();
-  /// The calling process alone, without MPI, as libraries use it to read files. It can neither
-  /// write files in parallel nor run a work queue. \test CommunicatorAlone.NeedsNoMpi
+  /// The calling process alone, without MPI: of libraries, and of programs that no launcher
+  /// started. It cannot write fields, which takes MPI-IO. \test CommunicatorAlone.NeedsNoMpi
   static Communicator alone();
 
   [[nodiscard]] int rank() const;

@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ranks/mpi_environment.h"
 
-#include <algorithm>
-#include <array>
 #include <atomic>
 #include <cstdlib>
 #include <string>
-#include <string_view>
 
 #include <mpi.h>
 
 #include "base/error.h"
+#include "ranks/launcher.h"
 
 namespace af {
 
@@ -18,32 +16,13 @@ namespace {
 
 std::atomic<bool> abort_required = false;
 
-/// The number of this process where mpirun or srun started it; "" where it stands alone. Of a shell
-/// that srun started, mpirun's variables count.
-std::string launched_rank() {
-  for (const char* name : {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"})
-    if (const char* const rank = std::getenv(name); rank != nullptr) return rank;
-  return "";
-}
-
-/// Whether mpirun or srun started this process, as one of several.
-bool is_launched() {
-  constexpr std::array kSetByLaunchers = {
-      "OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "PMI_FD", "PMI_ID"};
-  return std::any_of(kSetByLaunchers.begin(), kSetByLaunchers.end(), [](const char* name) {
-    return std::getenv(name) != nullptr;
-  });
-}
-
 /// Hides a step of one task from MPI while this lives. Such a shell, by srun, needs no process
 /// manager, but Open MPI looks for Slurm's and ends the program where there is none.
 class HiddenStep {
  public:
   HiddenStep() {
-    const char* const tasks = std::getenv("SLURM_STEP_NUM_TASKS");
     const char* const step = std::getenv(kStep);
-    if (is_launched() || tasks == nullptr || std::string_view(tasks) != "1" || step == nullptr)
-      return;
+    if (!is_only_task() || step == nullptr) return;
     step_ = step;
     unsetenv(kStep);
   }
@@ -84,18 +63,15 @@ MpiEnvironment::MpiEnvironment(int& argc, char**& argv) {
   if (needs_no_folder) unsetenv(kMakesFolder);
 }
 
-bool MpiEnvironment::is_first_process() {
-  const std::string rank = launched_rank();
-  return rank.empty() || rank == "0";
-}
-
 MpiEnvironment::~MpiEnvironment() {
   MPI_Finalize();
 }
 
 void MpiEnvironment::abort(int exit_code) {
+  int is_initialized = 0;
+  MPI_Initialized(&is_initialized);
   int ranks = 1;
-  MPI_Comm_size(MPI_COMM_WORLD, &ranks);
+  if (is_initialized != 0) MPI_Comm_size(MPI_COMM_WORLD, &ranks);
   // With one rank there is nobody to notify.
   if (ranks > 1) MPI_Abort(MPI_COMM_WORLD, exit_code);
   std::_Exit(exit_code);

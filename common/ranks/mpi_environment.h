@@ -12,14 +12,11 @@ class MpiEnvironment {
   MpiEnvironment(const MpiEnvironment&) = delete;
   MpiEnvironment& operator=(const MpiEnvironment&) = delete;
 
-  /// Whether this process speaks for the job, told from what launchers leave in its environment:
-  /// for programs that end before MPI begins.
-  [[nodiscard]] static bool is_first_process();
-
   /// What MPI says it supports: MPI_THREAD_SINGLE or more.
   [[nodiscard]] int thread_level() const { return thread_level_; }
 
-  /// Ends every rank of the job with `exit_code`, at once.
+  /// Ends every rank of the job with `exit_code`, at once: this process where MPI is not
+  /// initialised.
   [[noreturn]] static void abort(int exit_code);
 
   /// From now on this rank can only end by abort(): a library is in a state in which finalising MPI

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ranks/launcher.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+
+namespace af {
+
+namespace {
+
+/// "" when it is not set.
+std::string variable(const char* name) {
+  const char* const value = std::getenv(name);
+  return value == nullptr ? "" : value;
+}
+
+/// Of the step of Slurm that holds this process and that has no PMI; "" when there is none.
+std::string tasks_without_pmi() {
+  return is_launched() ? "" : variable("SLURM_STEP_NUM_TASKS");
+}
+
+}  // namespace
+
+bool is_launched() {
+  constexpr std::array kSetByLaunchers = {
+      "OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "PMI_FD", "PMI_ID"};
+  return std::any_of(kSetByLaunchers.begin(), kSetByLaunchers.end(), [](const char* name) {
+    return std::getenv(name) != nullptr;
+  });
+}
+
+bool is_first_process() {
+  // Of a shell that srun started, mpirun's variables count.
+  for (const char* name : {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"})
+    if (const std::string rank = variable(name); !rank.empty()) return rank == "0";
+  return true;
+}
+
+bool is_only_task() {
+  return tasks_without_pmi() == "1";
+}
+
+std::string lone_task_problem() {
+  const std::string tasks = tasks_without_pmi();
+  if (tasks.empty() || tasks == "1") return {};
+  return "srun started this process as one of several tasks (SLURM_STEP_NUM_TASKS=" + tasks +
+         ", SLURM_PROCID=" + variable("SLURM_PROCID") +
+         ") without PMI, by which they would find each other; each would do the whole job: use "
+         "srun --mpi=pmix or mpirun, or srun -n 1";
+}
+
+}  // namespace af

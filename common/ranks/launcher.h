@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// How this process was started, told without MPI from what launchers leave in its environment.
+#pragma once
+
+#include <string>
+
+namespace af {
+
+/// Whether mpirun, or srun with PMI or PMIx, started this process, so that MPI finds the others of
+/// the job. The shell of a Slurm job, by sbatch or salloc, has variables of the job alone.
+[[nodiscard]] bool is_launched();
+
+/// Whether this process speaks for the job: for programs that end before MPI begins.
+[[nodiscard]] bool is_first_process();
+
+/// Whether srun started this process, without PMI, as its only task.
+[[nodiscard]] bool is_only_task();
+
+/// Why this process may not run alone, with what to do: srun started it, without PMI, as one of
+/// several tasks, each of which would take itself for the whole job and write the same files. Empty
+/// when it may. \test Launcher.RefusesOneOfSeveralTasksWithoutPmi
+[[nodiscard]] std::string lone_task_problem();
+
+}  // namespace af
