@@ -6,4 +6,5 @@ af_add_mpi_test(run_folder_test SOURCES mpi/run_folder_test.cpp LIBS af_ranks RA
 af_add_mpi_test(resumable_items_test SOURCES mpi/resumable_items_test.cpp LIBS af_ranks RANKS 1 2 3 4)
 af_add_mpi_test(shared_inputs_test SOURCES mpi/shared_inputs_test.cpp LIBS af_study RANKS 1 2 3 4)
 
-af_add_test(run_test SOURCES unit/ranks/progress_journal_test.cpp unit/ranks/provenance_test.cpp LIBS af_ranks)
+af_add_test(run_test SOURCES unit/ranks/alone_test.cpp unit/ranks/progress_journal_test.cpp unit/ranks/provenance_test.cpp
+            LIBS af_ranks)

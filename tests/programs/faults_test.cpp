@@ -26,7 +26,6 @@ namespace fs = std::filesystem;
 using testing::AllOf;
 using testing::ContainsRegex;
 using testing::HasSubstr;
-using testing::Not;
 
 constexpr std::chrono::seconds kEndsWithin{300};
 constexpr int kRanks = 3;
@@ -193,28 +192,6 @@ TEST_F(Faults, AFullDiskWhileTheFieldIsWrittenEndsTheJobAtOnce) {
     EXPECT_FALSE(fs::exists(field()));
   }
   expect_going_on();
-}
-
-// Open MPI would give all programs without mpirun on a machine one folder: one that ended removed
-// it while another began, which then failed.
-TEST_F(Faults, AProgramWithoutMpirunSharesNoFolderWithOthers) {
-  const fs::path no_folder = study_file() / "temporary";
-  const test::ProgramRun run =
-      test::run_command("TMPDIR=" + no_folder.string() + " " AF_PROGRAM_FOLDER "/af-inspect " +
-                        study_file().string());
-  EXPECT_EQ(run.exit_code, 0) << run.output;
-  const test::ProgramRun launched = test::run_command(
-      "TMPDIR=" + no_folder.string() + " " AF_MPIEXEC " -n 1 " AF_PROGRAM_FOLDER "/af-inspect " +
-      study_file().string());
-  EXPECT_NE(launched.exit_code, 0) << "the folder can be made, and this test shows nothing";
-}
-
-TEST_F(Faults, AProgramWithoutMpirunSaysNothingOfMpi) {
-  const test::ProgramRun run = test::run_command(
-      AF_PROGRAM_FOLDER "/af-precompute --study " + study_file().string() +
-      " --camera AP --slabs 1 --uv-nodes 4 --st-nodes 16 --codewords 4 -o " + field().string());
-  EXPECT_EQ(run.exit_code, 0) << run.output;
-  EXPECT_THAT(run.output, Not(HasSubstr("mca_")));
 }
 
 TEST_F(Faults, AProgressFolderDeletedMeanwhileIsSaidOrNotNeeded) {

@@ -91,43 +91,6 @@ TEST(Option, IsFoundWithUnderscoresForDashes) {
   EXPECT_THAT(unknown.output, HasSubstr("--no_such_option"));
 }
 
-/// Runs a command in a step of Slurm of so many tasks that has no process manager, as a shell by
-/// `srun --pty` where MpiDefault is none.
-test::ProgramRun in_step(int tasks, const std::string& command) {
-  const std::string n = std::to_string(tasks);
-  return run_command(
-      "env -u OMPI_COMM_WORLD_RANK -u PMIX_RANK -u PMI_RANK -u PMI_FD -u PMI_ID"
-      " SLURM_JOB_ID=123 SLURM_JOBID=123 SLURM_STEP_ID=0 SLURM_STEPID=0"
-      " SLURM_NTASKS=" +
-      n + " SLURM_NPROCS=" + n + " SLURM_STEP_NUM_TASKS=" + n +
-      " SLURM_PROCID=0 SLURM_LOCALID=0 SLURM_NNODES=1 SLURM_JOB_NUM_NODES=1"
-      " SLURM_TASKS_PER_NODE=" +
-      n + " SLURM_STEP_TASKS_PER_NODE=" + n +
-      " SLURM_NODELIST=$(hostname) SLURM_JOB_NODELIST=$(hostname)"
-      " SLURM_STEP_NODELIST=$(hostname) " +
-      command);
-}
-
-TEST(SlurmStep, HelpNeedsNoMpi) {
-  for (const char* name : {"af-drr", "af-inspect", "af-evaluate"})
-    for (const int tasks : {1, 2})
-      for (const char* option : {"--help", "--version", "--help-as man"}) {
-        const std::string command = program(name) + " " + option;
-        const test::ProgramRun run = in_step(tasks, command);
-        EXPECT_EQ(run.exit_code, 0) << run.output;
-        EXPECT_EQ(run.output, run_command(command).output);
-      }
-}
-
-TEST(SlurmStep, OfOneTaskRunsAProgram) {
-  const test::ProgramRun one = in_step(1, program("af-inspect") + " c-arm-12in");
-  EXPECT_EQ(one.exit_code, 0) << one.output;
-  EXPECT_EQ(one.output, run_command(program("af-inspect") + " c-arm-12in").output);
-  EXPECT_EQ(in_step(1, program("af-inspect") + " --no-such-option").exit_code, 2);
-  // Each of two tasks would take itself for the whole job.
-  EXPECT_NE(in_step(2, program("af-inspect") + " c-arm-12in").exit_code, 0);
-}
-
 TEST(Help, IsPrintedOnceByAJob) {
   const std::string command = program("af-inspect") + " --version";
   EXPECT_EQ(run_command(AF_MPIEXEC " --oversubscribe -n 3 " + command).output,

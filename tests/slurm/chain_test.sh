@@ -42,6 +42,14 @@ wait_until() {
   done
 }
 
+# Without PMI each task would take itself for the whole job; one alone needs none.
+refused=0
+srun -n 2 --mpi=none "$bin/af-inspect" c-arm-12in >"$scratch/without-pmi.log" 2>&1 || refused=$?
+if ((refused != 2)) || ! grep -q 'SLURM_STEP_NUM_TASKS=2' "$scratch/without-pmi.log"; then
+  fail "two tasks without PMI were not refused"
+fi
+srun -n 1 --mpi=none "$bin/af-inspect" c-arm-12in >"$scratch/one-task.log" || fail "one task without PMI does not run"
+
 # Two patients: the spine phantom twice, at different poses.
 for seed in 1 2; do
   "$bin/af-simulate" --phantom spine --case "patient-$seed" --seed "$seed" -o "$scratch/patient-$seed" >"$scratch/simulate.log"
