@@ -73,7 +73,9 @@ std::shared_ptr<const FieldLevel> level_for(const CameraGeometry& camera,
         samples.push_back(static_cast<std::uint16_t>(std::lround(value / level->quantizer_step)));
     }
   samples.resize(samples.size() + kFieldLevelPadding);
-  level->slabs.push_back({slab, SharedArray<std::uint16_t>(std::move(samples))});
+  const SampleExtent extent{
+      level->field_geometry.u.nodes, level->field_geometry.v.nodes, image.size()};
+  level->slabs.push_back({slab, LevelSamples(extent, std::move(samples))});
   return level;
 }
 
