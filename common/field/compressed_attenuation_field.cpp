@@ -73,6 +73,28 @@ double filtered_level(const SlabTiles& tiles,
       std::floor(level / static_cast<double>(kTileElements) + 0.5), 0.0, kLargestLevel);
 }
 
+/// Without branches, so that compilers make vectors of it.
+std::uint16_t largest(std::span<const std::uint16_t> values) {
+  std::uint16_t result = 0;
+  for (const std::uint16_t value : values) result = std::max(result, value);
+  return result;
+}
+
+/// Whether means are multiples of `step`, and 0 where the index is. Multiplies by the step's
+/// reciprocal, rounded up to 2^-32, which divides any 16-bit number exactly.
+bool are_means(std::span<const std::uint16_t> indices,
+               std::span<const std::uint16_t> means,
+               std::uint32_t step) {
+  const std::uint64_t reciprocal = (std::uint64_t{1} << 32u) / step + 1;
+  std::uint32_t wrong = 0;
+  for (std::size_t i = 0; i < means.size(); ++i) {
+    const std::uint32_t mean = means[i];
+    const auto multiple = static_cast<std::uint32_t>((mean * reciprocal) >> 32u) * step;
+    wrong |= (mean ^ multiple) | (indices[i] == 0 ? mean : 0u);
+  }
+  return wrong == 0;
+}
+
 }  // namespace
 
 float CompressedAttenuationField::node_value(std::size_t slab, const NodeIndex& node) const {
@@ -102,20 +124,21 @@ std::vector<std::string> index_problems(std::span<const std::uint16_t> values,
                                         const Codebook& codebook,
                                         const std::string& name) {
   const std::size_t stride = codebook.values_per_tile() * row;
-  std::vector<std::string> found;
   for (std::size_t at = 0; at < values.size(); at += stride) {
     const auto indices = values.subspan(at, row);
-    if (*std::ranges::max_element(indices) >= codebook.size())
+    if (largest(indices) >= codebook.size())
       return {name + " has an index beyond the " + std::to_string(codebook.size()) + " codewords"};
     if (!codebook.has_means()) continue;
     const auto means = values.subspan(at + row, row);
+    const auto step = static_cast<std::uint32_t>(codebook.mean_step);
+    if (are_means(indices, means, step)) continue;
     for (std::size_t i = 0; i < row; ++i)
-      if (means[i] % codebook.mean_step != 0 || (indices[i] == 0 && means[i] != 0))
+      if (means[i] % step != 0 || (indices[i] == 0 && means[i] != 0))
         return {name + " has a mean of " + std::to_string(means[i]) + " levels with codeword " +
-                std::to_string(indices[i]) + ": means are multiples of " +
-                std::to_string(codebook.mean_step) + ", that of codeword 0 is 0"};
+                std::to_string(indices[i]) + ": means are multiples of " + std::to_string(step) +
+                ", that of codeword 0 is 0"};
   }
-  return found;
+  return {};
 }
 
 std::vector<std::string> problems(const CompressedAttenuationField& field) {
