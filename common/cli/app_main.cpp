@@ -121,8 +121,7 @@ std::string reason_text(const RankFailure& failure) {
 }
 
 /// Ends a process that would repeat the work of others.
-void refuse_lone_task(const CLI::App& app) {
-  const std::string problem = lone_task_problem();
+void refuse_if_any(const CLI::App& app, const std::string& problem) {
   if (problem.empty()) return;
   const bool is_reporting = is_first_process();
   if (is_reporting) std::cerr << app.get_name() << ": " << problem << std::endl;
@@ -173,9 +172,10 @@ int app_main(CLI::App& app,
   std::optional<WaitAlarm> alarm;  // outlives MPI
   std::optional<MpiEnvironment> environment;
   const auto join_job = [&](bool writes_by_mpi) {
-    refuse_lone_task(app);
+    refuse_if_any(app, lone_task_problem());
     if (!writes_by_mpi && !is_launched()) return Communicator::alone();
     environment.emplace(argc, argv);
+    refuse_if_any(app, split_job_problem(Communicator::world().size()));
     return Communicator::world();
   };
   app.name(program_name(argv[0]));

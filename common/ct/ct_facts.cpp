@@ -4,7 +4,7 @@
 #include <optional>
 #include <system_error>
 
-#include "base/build_info.h"
+#include "base/build_id.h"
 #include "base/number_text.h"
 #include "base/stored_bytes.h"
 #include "ct/ct_reader.h"
@@ -21,11 +21,6 @@ namespace af {
 namespace fs = std::filesystem;
 
 namespace {
-
-/// Of what a file becomes: to be raised when voxels, grid, facts or warnings of a CT that is read
-/// already change. Beside it stand version and commit, which do not tell changes apart that are not
-/// committed, and the library knows no commit.
-constexpr int kReaderVersion = 1;
 
 /// What is kept of a CT. Warnings name the path.
 struct KeptFacts {
@@ -60,16 +55,18 @@ std::optional<std::vector<std::string>> names_and_hashes(const fs::path& path) {
   return found;
 }
 
-/// Under which the facts are kept: what they follow from, hashed.
+/// Under which the facts are kept: what they follow from, hashed; the program's build id stands for
+/// all that decides what becomes of a file. None where nothing is to be kept: also of one series
+/// among others, whose files would have to be hashed, too.
 std::optional<std::string> key_of(const fs::path& path,
                                   const CtReadOptions& options,
                                   const AttenuationModel& model) {
+  const std::string program = build_id();
+  if (program.empty() || !options.series_uid.empty()) return std::nullopt;
   const auto files = names_and_hashes(path);
   if (!files) return std::nullopt;
   const std::vector<std::string> how = {"facts of a CT",
-                                        std::to_string(kReaderVersion),
-                                        std::string(program_version()),
-                                        std::string(program_commit()),
+                                        program,
                                         path.string(),
                                         number_text(model.mu_water_per_mm),
                                         std::to_string(model.air_below_hu)};

@@ -369,7 +369,7 @@ FieldLevel decode_halved_field(const std::shared_ptr<const CompressedAttenuation
                                const FieldLevelMemory& memory) {
   check(field->slabs.size() == 1, "several slabs are merged from their decoded samples");
   if (!field->codebook.filter) return decoded_level(field, 1, memory);
-  return next_field_level(std::make_shared<const FieldLevel>(decode_field(field, memory)), memory);
+  return next_field_level(std::make_shared<const FieldLevel>(decode_field(field)), memory);
 }
 
 FieldLevel next_field_level(const std::shared_ptr<const FieldLevel>& level,
@@ -390,7 +390,7 @@ FieldLevels make_field_pyramid(const std::shared_ptr<const CompressedAttenuation
                                const FieldLevelMemory& memory) {
   if (field->slabs.size() > 1)
     return make_field_pyramid(
-        std::make_shared<const FieldLevel>(decode_field(field, memory)), coarsest_level, memory);
+        std::make_shared<const FieldLevel>(decode_field(field)), coarsest_level, memory);
   check(coarsest_level >= 1, "a pyramid begins at level 1");
   FieldLevels levels{std::make_shared<const FieldLevel>(decode_halved_field(field, memory))};
   append_levels(coarsest_level, memory, levels);

@@ -83,8 +83,8 @@ std::size_t decoded_bytes(const CompressedAttenuationField& field);
 FieldLevel decode_field(const std::shared_ptr<const CompressedAttenuationField>& field,
                         const FieldLevelMemory& memory = process_memory());
 
-/// Level 1 of a compressed field of one slab, without the memory of its level 0 unless its codebook
-/// has a filter. InputError when an axis has too few nodes to halve.
+/// Level 1 of a compressed field of one slab, without its level 0 unless its codebook has a filter:
+/// then that is in memory of this process. InputError when an axis has too few nodes to halve.
 FieldLevel decode_halved_field(const std::shared_ptr<const CompressedAttenuationField>& field,
                                const FieldLevelMemory& memory = process_memory());
 
@@ -94,7 +94,8 @@ FieldLevel next_field_level(const std::shared_ptr<const FieldLevel>& level,
 
 using FieldLevels = std::vector<std::shared_ptr<const FieldLevel>>;
 
-/// Levels 1 ... coarsest_level of a compressed field, [0] being level 1; coarsest_level >= 1.
+/// Levels 1 ... coarsest_level of a compressed field, [0] being level 1; coarsest_level >= 1. The
+/// level 0 of several slabs is in memory of this process.
 FieldLevels make_field_pyramid(const std::shared_ptr<const CompressedAttenuationField>& field,
                                int coarsest_level,
                                const FieldLevelMemory& memory = process_memory());

@@ -8,16 +8,16 @@
 #include <limits>
 #include <new>
 #include <thread>
-#include <unistd.h>
 #include <utility>
 
 #include "base/error.h"
+#include "base/fork_aware_mutex.h"
 
 namespace af {
 
 namespace {
 
-/// In place of the number of the process that makes a tile.
+/// In place of the fork_generation(), and one, of the process that makes a tile.
 constexpr std::uint32_t kNobody = 0;
 constexpr std::uint32_t kMade = std::numeric_limits<std::uint32_t>::max();
 constexpr std::chrono::microseconds kWait{50};
@@ -79,7 +79,7 @@ std::span<const std::uint16_t> LevelSamples::view() const {
 void LevelSamples::require_tile(int a, int b) const {
   const int b_tiles = tiles_of(extent_.v_nodes);
   const std::atomic_ref maker(makers_[static_cast<std::size_t>(a * b_tiles + b)]);
-  const auto self = static_cast<std::uint32_t>(::getpid());
+  const std::uint32_t self = fork_generation() + 1;
   std::uint32_t seen = kNobody;
   while (!maker.compare_exchange_strong(seen, self)) {
     if (seen == kMade) return;

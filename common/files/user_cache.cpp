@@ -5,6 +5,8 @@
 #include <cstdlib>
 #include <filesystem>
 #include <string_view>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "base/error.h"
 #include "files/output_file.h"
@@ -37,6 +39,15 @@ fs::path entry_of(const std::string& key) {
   return caches / "attenuation-fields" / key;
 }
 
+/// Nobody else may have written what is read, or learns from it which CTs there are.
+void require_private(const fs::path& folder) {
+  struct stat found {};
+  constexpr mode_t kOthers = S_IRWXG | S_IRWXO;
+  if (::stat(folder.c_str(), &found) != 0 || found.st_uid != ::geteuid() ||
+      (found.st_mode & kOthers) != 0)
+    throw FileError(folder.string(), "is not this user's alone");
+}
+
 /// Of an entry that is whole and of this key.
 std::string checksum(std::string_view key, std::string_view content) {
   Sha256 hash;
@@ -48,6 +59,7 @@ std::string checksum(std::string_view key, std::string_view content) {
 
 std::vector<std::byte> read(const std::string& key) {
   const fs::path path = entry_of(key);
+  require_private(path.parent_path());
   const std::string entry = read_own_text_file(path, kMostBytes);
   const std::string_view content =
       std::string_view(entry).substr(std::min(kChecksumDigits, entry.size()));
@@ -59,7 +71,12 @@ std::vector<std::byte> read(const std::string& key) {
 void write(const std::string& key, std::span<const std::byte> bytes) {
   const fs::path path = entry_of(key);
   const std::string_view content(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  make_folder(path.parent_path());
+  const fs::path folder = path.parent_path();
+  if (!fs::exists(folder)) {
+    make_folder(folder);
+    fs::permissions(folder, fs::perms::owner_all);
+  }
+  require_private(folder);
   write_text_file(path, checksum(key, content).append(content));
 }
 

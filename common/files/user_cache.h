@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What can be made again at any time, kept for one user between runs: a file for each key, in
-// attenuation-fields/ of $XDG_CACHE_HOME or else of $HOME/.cache. Where there is no such folder, or
-// it cannot be written, nothing is kept and nobody is told: only time is lost.
+// attenuation-fields/ of $XDG_CACHE_HOME or else of $HOME/.cache. Where there is no such folder, it
+// cannot be written, or others may enter it, nothing is kept and nobody is told: only time is lost.
 #pragma once
 
 #include <cstddef>

@@ -23,8 +23,13 @@ std::string tasks_without_pmi() {
 }  // namespace
 
 bool is_launched() {
-  constexpr std::array kSetByLaunchers = {
-      "OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "PMI_FD", "PMI_ID"};
+  constexpr std::array kSetByLaunchers = {"OMPI_COMM_WORLD_RANK",
+                                          "PMIX_RANK",
+                                          "PMI_RANK",
+                                          "PMI_FD",
+                                          "PMI_ID",
+                                          "MV2_COMM_WORLD_RANK",
+                                          "ALPS_APP_PE"};
   return std::any_of(kSetByLaunchers.begin(), kSetByLaunchers.end(), [](const char* name) {
     return std::getenv(name) != nullptr;
   });
@@ -47,7 +52,21 @@ std::string lone_task_problem() {
   return "srun started this process as one of several tasks (SLURM_STEP_NUM_TASKS=" + tasks +
          ", SLURM_PROCID=" + variable("SLURM_PROCID") +
          ") without PMI, by which they would find each other; each would do the whole job: use "
-         "srun --mpi=pmix or mpirun, or srun -n 1";
+         "srun --mpi=pmix or mpirun, or srun -n 1; where each task does a job of its own, unset "
+         "SLURM_STEP_NUM_TASKS";
+}
+
+std::string split_job_problem(int joined) {
+  for (const char* name : {"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MV2_COMM_WORLD_SIZE"}) {
+    const std::string processes = variable(name);
+    if (processes.empty()) continue;
+    if (joined > 1 || processes == "1") return {};
+    return "a launcher of another MPI started this process as one of several (" +
+           std::string(name) + "=" + processes +
+           "), which do not find each other; each would do the whole job: use the mpirun of the "
+           "Open MPI that the programs are linked with";
+  }
+  return {};
 }
 
 }  // namespace af

@@ -21,4 +21,8 @@ namespace af {
 /// when it may. \test Launcher.RefusesOneOfSeveralTasksWithoutPmi
 [[nodiscard]] std::string lone_task_problem();
 
+/// Why a job of `joined` ranks may not go on, with what to do: the launcher started several
+/// processes that MPI has not joined. Empty when it may.
+[[nodiscard]] std::string split_job_problem(int joined);
+
 }  // namespace af

@@ -51,8 +51,9 @@ std::string NodeMemoryFile::create(std::size_t bytes) {
   }
   created_ = name;
   // Room for all of it at once: a page that is touched where there is none ends the process.
-  errno = ::posix_fallocate(descriptor_, 0, static_cast<off_t>(std::max<std::size_t>(bytes, 1)));
-  if (errno == ENOSPC || errno == EFBIG) throw no_room(descriptor_, bytes);
+  do errno = ::posix_fallocate(descriptor_, 0, static_cast<off_t>(std::max<std::size_t>(bytes, 1)));
+  while (errno == EINTR);
+  if (errno == ENOSPC || errno == EFBIG || errno == ENOMEM) throw no_room(descriptor_, bytes);
   if (errno != 0) throw failure(name, "cannot be enlarged");
   return name;
 }

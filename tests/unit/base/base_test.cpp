@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <limits>
+#include <memory>
 #include <set>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "base/build_id.h"
 #include "base/error.h"
 #include "base/hash_random.h"
 #include "base/joined.h"
@@ -18,6 +21,19 @@
 
 namespace af {
 namespace {
+
+/// As `readelf --notes` shows it: SHA-1, or shorter by other linkers.
+TEST(BuildId, IsThatOfThisProgram) {
+  EXPECT_GE(build_id().size(), 16u);
+  EXPECT_EQ(build_id().find_first_not_of("0123456789abcdef"), std::string::npos);
+  std::array<char, 256> line{};
+  const std::unique_ptr<FILE, int (*)(FILE*)> notes(popen("readelf --notes /proc/$PPID/exe", "r"),
+                                                    pclose);
+  std::string text;
+  while (fgets(line.data(), static_cast<int>(line.size()), notes.get()) != nullptr)
+    text += line.data();
+  EXPECT_NE(text.find("Build ID: " + build_id()), std::string::npos) << text;
+}
 
 TEST(HashRandom, DependsOnItsKeysAloneAndOnAllOfThem) {
   EXPECT_EQ(HashRandom(1, 2, 3).next_bits(), HashRandom(1, 2, 3).next_bits());

@@ -57,6 +57,20 @@ TEST(UserCache, FindsNothingInAnEntryThatIsDamagedOrOfAnotherKeyOrType) {
   EXPECT_EQ(cached<int>(kKey), std::nullopt);
 }
 
+TEST(UserCache, TrustsNoFolderThatOthersMayEnter) {
+  const OwnCache cache;
+  keep_in_cache(kKey, Numbers{1.0});
+  EXPECT_EQ(fs::status(cache.folder()).permissions(), fs::perms::owner_all);
+  for (const fs::perms others : {fs::perms::group_write, fs::perms::others_read}) {
+    fs::permissions(cache.folder(), fs::perms::owner_all | others);
+    EXPECT_EQ(cached<Numbers>(kKey), std::nullopt);
+    keep_in_cache("another", Numbers{2.0});
+  }
+  fs::permissions(cache.folder(), fs::perms::owner_all);
+  EXPECT_EQ(cached<Numbers>(kKey), Numbers{1.0});
+  EXPECT_EQ(cached<Numbers>("another"), std::nullopt);
+}
+
 TEST(UserCache, KeepsNothingAndSaysNothingWhereItCannotWrite) {
   const OwnCache cache;
   const test::ScratchFolder folder;

@@ -28,6 +28,11 @@ class Launcher : public testing::Test {
                              "PMI_RANK",
                              "PMI_FD",
                              "PMI_ID",
+                             "PMI_SIZE",
+                             "OMPI_COMM_WORLD_SIZE",
+                             "MV2_COMM_WORLD_RANK",
+                             "MV2_COMM_WORLD_SIZE",
+                             "ALPS_APP_PE",
                              "SLURM_PROCID",
                              "SLURM_STEP_NUM_TASKS"})
       unsetenv(name);
@@ -72,6 +77,15 @@ TEST_F(Launcher, IsMpirunWithinAStep) {
   EXPECT_TRUE(is_launched());
   EXPECT_FALSE(is_first_process());
   EXPECT_EQ(lone_task_problem(), "");
+}
+
+TEST_F(Launcher, RefusesProcessesThatMpiHasNotJoined) {
+  EXPECT_EQ(split_job_problem(1), "");
+  set("PMI_SIZE", "1");
+  EXPECT_EQ(split_job_problem(1), "");
+  set("PMI_SIZE", "4");
+  EXPECT_EQ(split_job_problem(4), "");
+  EXPECT_THAT(split_job_problem(1), HasSubstr("PMI_SIZE=4"));
 }
 
 TEST(WorkQueueAlone, HandsOutEveryItemInOrder) {
