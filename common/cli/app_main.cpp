@@ -134,6 +134,9 @@ void end_job(const CLI::App& app, const std::string& stall) {
   text << app.get_name() << ": " << stall
        << " (--stall-minutes): the job is ended; run the same command again to go on\n";
   std::cerr << text.str() << std::flush;
+  // Open MPI 5 loses what its launcher has not read yet.
+  constexpr std::chrono::milliseconds kUntilRead{200};
+  std::this_thread::sleep_for(kUntilRead);
   MpiEnvironment::abort(static_cast<int>(ExitCode::Stopped));
 }
 

@@ -35,8 +35,8 @@ std::string bytes_of_file(const std::filesystem::path& path) {
 void start_mpi() {
   static int argc = 1;
   static std::array<char, 5> name = {'f', 'u', 'z', 'z', '\0'};
-  static char* pointer = name.data();
-  static char** argv = &pointer;
+  static std::array<char*, 2> arguments = {name.data(), nullptr};
+  static char** argv = arguments.data();
   static const MpiEnvironment mpi(argc, argv);
 }
 

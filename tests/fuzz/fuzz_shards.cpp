@@ -27,8 +27,8 @@ const std::string kFirstShard = "units.0000-000000.records";
 Communicator world() {
   static int argc = 1;
   static std::array<char, 5> name = {'f', 'u', 'z', 'z', '\0'};
-  static char* pointer = name.data();
-  static char** argv = &pointer;
+  static std::array<char*, 2> arguments = {name.data(), nullptr};
+  static char** argv = arguments.data();
   static const MpiEnvironment mpi(argc, argv);
   return Communicator::world();
 }

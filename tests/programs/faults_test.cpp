@@ -90,7 +90,7 @@ class Faults : public testing::Test {
   }
 
   /// `command` on a disk that is full: no file of a rank may grow beyond `bytes`. Segments of
-  /// shared memory are such files, so that messages take the network.
+  /// shared memory are such files, so that messages take the loopback.
   static std::vector<std::string> on_full_disk(std::vector<std::string> command,
                                                std::uint64_t bytes) {
     const auto insert_at = [&](const std::string& word, int after, std::vector<std::string> words) {
@@ -100,7 +100,7 @@ class Faults : public testing::Test {
     };
     insert_at(
         AF_PROGRAM_FOLDER "/af-precompute", 0, {"prlimit", "--fsize=" + std::to_string(bytes)});
-    insert_at(AF_MPIEXEC, 1, {"--mca", "btl", "self,tcp"});
+    insert_at(AF_MPIEXEC, 1, {"--mca", "btl", "self,tcp", "--mca", "btl_tcp_if_include", "lo"});
     return command;
   }
 

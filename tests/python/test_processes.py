@@ -12,7 +12,7 @@ import time
 import unittest
 
 PRELUDE = """
-import os, signal, sys, threading, time
+import os, signal, sys, threading, time, warnings
 import numpy as np
 import attenuation_fields as af
 
@@ -164,6 +164,7 @@ class ForkTest(unittest.TestCase):
                     "def work():",
                     "    while True: call()",
                     "threading.Thread(target=work, daemon=True).start()",
+                    "warnings.simplefilter('ignore', DeprecationWarning)  # of fork() beside threads",
                     "for i in range(8):",
                     "    time.sleep(0.02)",
                     "    copy = os.fork()",
