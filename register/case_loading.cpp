@@ -395,6 +395,7 @@ LoadedCase load_case(const Study& study,
     loaded.input_notes["ct"] = "read " + how(study_case.ct_reading);
     problem->scaling_points_ct = ct_lattice_points(ct->grid);
     problem->cut_points_ct = ct->cut_points_ct;
+    problem->ct_grid = ct->grid;
   } else {
     const Eigen::Vector3d half = Eigen::Vector3d::Constant(kAssumedCtHalfSideMm);
     problem->scaling_points_ct =

@@ -30,11 +30,12 @@ double window_position(double value, double low, double high) {
   return value > low ? 1.0 : 0.0;
 }
 
+std::uint32_t byte_of(double part) {
+  return static_cast<std::uint32_t>(std::lround(255.0 * part));
+}
+
 std::uint32_t packed(const Color& color) {
-  const auto byte = [](double part) {
-    return static_cast<std::uint32_t>(std::lround(255.0 * part));
-  };
-  return byte(color.red) << 16 | byte(color.green) << 8 | byte(color.blue);
+  return byte_of(color.red) << 16 | byte_of(color.green) << 8 | byte_of(color.blue);
 }
 
 Color mixed(const Color& a, const Color& b, double share_of_b) {
@@ -45,7 +46,7 @@ Color mixed(const Color& a, const Color& b, double share_of_b) {
 
 /// Grey from black to white, or blue through white to red (ends as in ColorBrewer's RdBu).
 std::uint32_t color_of(double position, PicturePanel::Colors colors) {
-  if (colors == PicturePanel::Colors::Grey) return packed({position, position, position});
+  if (colors == PicturePanel::Colors::Grey) return 0x010101U * byte_of(position);
   constexpr Color kBlue{0.13, 0.40, 0.67};
   constexpr Color kWhite{1.0, 1.0, 1.0};
   constexpr Color kRed{0.70, 0.09, 0.17};

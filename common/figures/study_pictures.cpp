@@ -3,7 +3,8 @@
 
 #include <algorithm>
 #include <limits>
-#include <memory>
+#include <optional>
+#include <string_view>
 
 #include "base/error.h"
 #include "drr/field_coverage.h"
@@ -185,7 +186,7 @@ Image2d with_mask(Image2d xray, Image2d mask, int factor) {
 void draw_view(const Study& study,
                const StudyCase& study_case,
                const StudyView& view,
-               const DrrRenderer& caster,
+               const ViewRenderer& renderer_of,
                const std::vector<ShownPose>& poses,
                int most_pixels,
                const std::string& stem,
@@ -213,7 +214,8 @@ void draw_view(const Study& study,
   add_landmarks(study_case, view, shrunk, camera, nullptr, panels.back());
   Image2d last_drr;
   for (const ShownPose& pose : poses) {
-    last_drr = render_image(caster, pose.room_from_ct, shrunk.view);
+    const std::shared_ptr<const DrrRenderer> renderer = renderer_of(shrunk.view, pose.room_from_ct);
+    last_drr = render_image(*renderer, pose.room_from_ct, shrunk.view);
     if (std::ranges::max(last_drr.pixels) <= 0.0f) {
       const std::string what = "the DRR at the " + pose.name + " is empty: no ray meets the CT";
       pictures.telltales.push_back("camera " + camera.name + ": " + what);
@@ -221,15 +223,17 @@ void draw_view(const Study& study,
                                   "': " + what);
     }
     const EdgeLetters at_pose = edge_letters(camera, pose.room_from_ct);
-    panels.push_back(panel_with(last_drr,
-                                view,
-                                shrunk,
-                                "DRR, " + pose.name,
-                                "cast through the CT; beam from " + at_pose.beam_from + " to " +
-                                    at_pose.beam_to +
-                                    (study_case.landmarks_ct_mm.empty()
-                                         ? ""
-                                         : "; crosses: landmarks where this pose puts them")));
+    panels.push_back(
+        panel_with(last_drr,
+                   view,
+                   shrunk,
+                   "DRR, " + pose.name,
+                   (renderer->name() == std::string_view("field") ? "looked up in the field"
+                                                                  : "cast through the CT") +
+                       std::string("; beam from ") + at_pose.beam_from + " to " + at_pose.beam_to +
+                       (study_case.landmarks_ct_mm.empty()
+                            ? ""
+                            : "; crosses: landmarks where this pose puts them")));
     add_letters(at_pose, whole, panels.back());
     add_region(view, shrunk, panels.back());
     panels.back().caption += add_coverage(field, shrunk, pose.room_from_ct, panels.back());
@@ -265,14 +269,19 @@ bool looks_nominal(const RigidTransform& room_from_ct, const StudyCase& study_ca
 
 }  // namespace
 
+ViewRenderer cast_views(const CtVolume& ct) {
+  return [caster = std::make_shared<const RayCastDrr>(std::make_shared<const AttenuationVolume>(
+              ct, AttenuationModel()))](const View&, const RigidTransform&) { return caster; };
+}
+
 StudyPictures draw_study_pictures(const Study& study,
                                   const StudyCase& study_case,
-                                  const CtVolume& ct,
+                                  const CtGrid& ct,
+                                  const ViewRenderer& renderer_of,
                                   int most_pixels,
                                   const std::filesystem::path& folder,
                                   const std::string& stem) {
   StudyPictures pictures;
-  const RayCastDrr caster(std::make_shared<const AttenuationVolume>(ct, AttenuationModel()));
   std::vector<ShownPose> poses = {{"nominal pose", study_case.nominal_room_from_ct}};
   if (has_landmarks(study_case)) {
     const LandmarkPose pose = landmark_pose(study, study_case);
@@ -282,12 +291,18 @@ StudyPictures draw_study_pictures(const Study& study,
   }
   std::vector<CameraGeometry> cameras;
   for (const StudyView& view : study_case.views) {
-    draw_view(
-        study, study_case, view, caster, poses, most_pixels, (folder / stem).string(), pictures);
+    draw_view(study,
+              study_case,
+              view,
+              renderer_of,
+              poses,
+              most_pixels,
+              (folder / stem).string(),
+              pictures);
     cameras.push_back(study.rig.camera(view.camera));
   }
   const std::filesystem::path path = folder / (stem + "-room.png");
-  write_picture(room_sketch(cameras, ct.grid, poses.back().room_from_ct),
+  write_picture(room_sketch(cameras, ct, poses.back().room_from_ct),
                 3,
                 study_case.name + ": the room at the " + poses.back().name,
                 path);

@@ -4,7 +4,8 @@
 #pragma once
 
 #include <filesystem>
-#include <optional>
+#include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -23,14 +24,22 @@ struct StudyPictures {
   std::vector<std::string> problems;  ///< views at which a DRR is empty
 };
 
+/// What makes the DRR of a view of a camera at a pose. Each ray of the view is inside.
+using ViewRenderer = std::function<std::shared_ptr<const DrrRenderer>(
+    const View& view, const RigidTransform& room_from_ct)>;
+
+/// Rays cast through a CT, for every view.
+ViewRenderer cast_views(const CtVolume& ct);
+
 /// Draws STEM-CAMERA.png for each view of a case (X-ray and DRRs at the nominal pose and, where the
 /// case has landmarks, at the pose that they give; patient letters at the edges, region, landmarks,
 /// the limit of the field's cover where the field exists) and STEM-room.png (sources, detectors and
-/// CT box). DRRs are cast through the CT. Detectors with more than `most_pixels` on a side are
+/// CT box). DRRs are those of `renderer_of`. Detectors with more than `most_pixels` on a side are
 /// shrunk. Nothing is ever flipped. Errors as of reading the X-rays and the fields.
 StudyPictures draw_study_pictures(const Study& study,
                                   const StudyCase& study_case,
-                                  const CtVolume& ct,
+                                  const CtGrid& ct,
+                                  const ViewRenderer& renderer_of,
                                   int most_pixels,
                                   const std::filesystem::path& folder,
                                   const std::string& stem);

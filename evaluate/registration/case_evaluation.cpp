@@ -397,18 +397,34 @@ void draw_pictures(const RegistrationStudyOptions& options,
       method, chosen_rows(rows), study_case, yardstick, options.output_folder, evaluation);
 }
 
+/// Rank 0: the first method that holds all rays of a view, which is as good as the CT for a look at
+/// it; else rays cast through the CT, which is then read. `methods` must outlive it.
+ViewRenderer setting_renderer(const std::vector<Method>& methods, const StudyCase& study_case) {
+  return [&, cast = ViewRenderer()](const View& view, const RigidTransform& pose) mutable {
+    for (const Method& method : methods)
+      for (const registration::RegistrationView& known : method.problem().views)
+        if (known.view.camera.name == view.camera.name &&
+            known.renderer->rays_outside(pose, view) == 0)
+          return known.renderer;
+    if (!cast) cast = cast_views(read_case_ct(study_case));
+    return cast(view, pose);
+  };
+}
+
 /// Rank 0: how cameras, X-rays and poses of a case fit together, which was the same before anything
 /// was registered.
 void draw_setting(const RegistrationStudyOptions& options,
                   const Study& study,
                   const StudyCase& study_case,
+                  const std::vector<Method>& methods,
                   CaseEvaluation& evaluation) {
   const WorkNote note("drawing the setting of case " + study_case.name, WorkNote::Kind::Phase);
   // A report holds the pictures of all cases.
   constexpr int kMostPixels = 320;
   const StudyPictures pictures = draw_study_pictures(study,
                                                      study_case,
-                                                     read_case_ct(study_case),
+                                                     methods.front().problem().ct_grid.value(),
+                                                     setting_renderer(methods, study_case),
                                                      kMostPixels,
                                                      options.output_folder,
                                                      file_name_part(study_case.name) + "-setting");
@@ -547,14 +563,14 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
   // The starts go before the rows come: memory has room for only one of the two.
   evaluation.starts.starts = {};
   do_on_root(world, [&] {
-    if (!options.pictures.are_left_out)
-      draw_pictures(options, study_case, methods.front(), rows.front(), yardstick, evaluation);
+    if (options.pictures.are_left_out) return;
+    draw_pictures(options, study_case, methods.front(), rows.front(), yardstick, evaluation);
+    draw_setting(options, study, study_case, methods, evaluation);
   });
   // Fields and CT go before the rows come: memory has room for only one of the two. Only fields
   // that the next case uses, too, stay (KeptFields).
   methods.clear();
   do_on_root(world, [&] {
-    if (!options.pictures.are_left_out) draw_setting(options, study, study_case, evaluation);
     const WorkNote note("reading the rows of case " + study_case.name, WorkNote::Kind::Phase);
     for (const MethodRows& method : rows)
       evaluation.traces[method.renderer] = add_rows(method, all_rows);

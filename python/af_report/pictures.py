@@ -54,7 +54,7 @@ def pictures(run):
             Figures([figure for *_, figure in shown])]
     if setting:
         blocks += [heading("Whether the study fits together"), Text(
-            "X-rays as they are, DRRs cast at the nominal pose and, where there are landmarks, at theirs, with the patient's directions at "
+            "X-rays as they are, DRRs at the nominal pose and, where there are landmarks, at theirs, with the patient's directions at "
             "the edges; the room with sources, detectors and the CT's box. Nothing is flipped or scaled.")]
         for case, texts in facts.items():
             blocks.append(Items([Markup("Case %s: <b>%s</b>%s") % (case, before, text) for before, text in texts]))

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "drr/drr_renderer.h"
+#include "geometry/ct_grid.h"
 #include "geometry/rigid_transform.h"
 #include "register/problem/multi_view_objective.h"
 #include "xray/image2d.h"
@@ -56,6 +57,7 @@ struct RegistrationProblem {
   std::vector<RegistrationView> views;
   std::vector<Eigen::Vector3d> target_points_ct;  ///< of the target box; a correction needs them
   std::vector<Eigen::Vector3d> cut_points_ct;     ///< see cut_points(); silhouettes leave them out
+  std::optional<CtGrid> ct_grid;                  ///< none where nobody looked at the CT
 
   /// What the parameters in results are relative to.
   [[nodiscard]] PoseFrame frame() const {

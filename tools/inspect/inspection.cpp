@@ -313,8 +313,8 @@ DrawnPictures draw_pictures(const fs::path& study_or_ct,
     const std::string stem = file_name_part(study_case.name);
     std::vector<std::string> warnings;
     const CtVolume ct = read_case_ct(study_case, &warnings);
-    StudyPictures pictures =
-        draw_study_pictures(study, study_case, ct, kMostDetectorPixels, folder, stem);
+    StudyPictures pictures = draw_study_pictures(
+        study, study_case, ct.grid, cast_views(ct), kMostDetectorPixels, folder, stem);
     for (const fs::path& file :
          draw_ct_pictures(ct, {study_case.target_box_ct, study_case.landmarks_ct_mm}, folder, stem))
       pictures.files.push_back(file);
