@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "figures/study_pictures.h"
+
 #include <cmath>
 
 #include <gmock/gmock.h>
@@ -10,6 +12,8 @@
 #include "figures/picture_match.h"
 #include "figures/room_sketch.h"
 #include "study/rig_file.h"
+#include "support/test_paths.h"
+#include "xray/image_file.h"
 
 namespace af {
 namespace {
@@ -161,6 +165,59 @@ TEST(RoomSketch, ShowsEveryCameraWithinItsPaper) {
       EXPECT_GE(std::min(mark.place[0], mark.place[1]), 0.0);
       EXPECT_LE(std::max(mark.place[0], mark.place[1]), panel.image.width);
     }
+  }
+}
+
+/// DRRs of one value, which keeps the views that it was asked for.
+class FlatDrr final : public DrrRenderer {
+ public:
+  explicit FlatDrr(float value) : value_(value) {}
+  RenderStatus render(const RigidTransform& /*room_from_ct*/,
+                      const View& /*view*/,
+                      RenderWorkspace& /*workspace*/,
+                      std::span<float> total_attenuation,
+                      const std::optional<PoseGradients>& /*gradients*/) const override {
+    std::ranges::fill(total_attenuation, value_);
+    return {};
+  }
+  [[nodiscard]] std::unique_ptr<RenderWorkspace> make_workspace() const override {
+    return std::make_unique<RenderWorkspace>();
+  }
+  [[nodiscard]] const char* name() const override { return "field"; }
+
+ private:
+  float value_;
+};
+
+TEST(StudyPictures, ShowTheDrrsOfTheRendererThatIsNamedForAView) {
+  const test::ScratchFolder folder;
+  Study study;
+  study.rig = parse_rig(builtin_rig_text("c-arm-12in"), "c-arm-12in");
+  const CameraGeometry& camera = study.rig.camera("AP");
+  const Image2d xray = uneven_picture(camera.size_px.x());
+  write_image(xray, folder / "xray.mha", camera.pixel_spacing_mm.x(), camera.pixel_spacing_mm.y());
+  StudyCase& of = study.cases.emplace_back();
+  of.name = "one";
+  StudyView& view = of.views.emplace_back();
+  view.camera = "AP";
+  view.xray = folder / "xray.mha";
+  view.xray_domain = XrayDomain::Attenuation;
+  view.roi = {64, 64, 128, 128};
+  CtGrid ct;
+  ct.size = {100, 100, 50};
+  for (const float value : {1.0F, 0.0F}) {
+    std::vector<int> widths;
+    const ViewRenderer renderer_of = [&](const View& seen, const RigidTransform& /*pose*/) {
+      widths.push_back(seen.roi.width);
+      return std::make_shared<const FlatDrr>(value);
+    };
+    const StudyPictures drawn =
+        draw_study_pictures(study, of, ct, renderer_of, 128, folder.path(), "one");
+    EXPECT_EQ(widths, std::vector<int>{camera.size_px.x() / 2}) << "the nominal pose, shrunk";
+    EXPECT_EQ(drawn.problems.size(), value > 0.0F ? 0U : 1U) << "a DRR without matter";
+    EXPECT_EQ(drawn.files.size(), 2U);
+    for (const std::filesystem::path& file : drawn.files)
+      EXPECT_TRUE(std::filesystem::exists(file)) << file;
   }
 }
 
