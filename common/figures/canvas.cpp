@@ -151,9 +151,8 @@ std::string Canvas::png() {
   image.width = static_cast<png_uint_32>(cairo_image_surface_get_width(surface_.get()));
   image.height = static_cast<png_uint_32>(cairo_image_surface_get_height(surface_.get()));
   image.format = PNG_FORMAT_RGB;
-  // cairo's own writer takes three times as long for files that are a fifth smaller.
+  // The best compression takes three times as long for files that are a fifth smaller.
   image.flags = PNG_IMAGE_FLAG_FAST;
-  image.flags = PNG_IMAGE_FLAG_FAST;  // a fourth of the time, for a fourth more bytes
   const std::vector<png_byte> pixels = rgb_pixels(surface_.get());
   png_alloc_size_t length = PNG_IMAGE_PNG_SIZE_MAX(image);
   std::string bytes(length, '\0');
