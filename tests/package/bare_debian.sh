@@ -125,7 +125,7 @@ install_ours() {
   apt-get install -y -q --no-install-recommends /packages/*.deb
   for program in precompute drr simulate scan register evaluate inspect; do
     if ldd "/usr/bin/af-$program" | grep 'not found'; then exit 1; fi
-    zcat "/usr/share/man/man1/af-$program.1.gz" | grep -q "af-$program"
+    [[ "$(zcat "/usr/share/man/man1/af-$program.1.gz")" == *"af\\-$program"* ]]
     bash -n "/usr/share/bash-completion/completions/af-$program"
   done
   for file in copyright LICENSE README.md docs/getting-started.md; do
