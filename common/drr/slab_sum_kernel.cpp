@@ -20,34 +20,38 @@ AF_KERNEL_INLINE Ints load_ints(const int32_t* from) {
   return vector;
 }
 
-/// Sum of an image's rows by the weights of row r, kLanes columns from c on.
-AF_KERNEL_INLINE Floats weighted_rows(const float* image,
-                                      int64_t stride,
-                                      const float* const (&weights)[kSumTaps],
-                                      int32_t r,
-                                      int32_t c) {
+AF_KERNEL_INLINE Floats weighted(const Floats (&weights)[kSumTaps],
+                                 const Floats (&values)[kSumTaps]) {
   Floats sum = splat(0.0f);
-  for (int tap = 0; tap < kSumTaps; ++tap) sum += weights[tap][r] * load(image + tap * stride + c);
+  for (int tap = 0; tap < kSumTaps; ++tap) sum += weights[tap] * values[tap];
   return sum;
 }
 
 /// The slab's images at row r of the sum.
 template <bool kWithSlopes>
 AF_KERNEL_INLINE void make_rows(const SlabTerm& term, int32_t r) {
-  const float* const weights[kSumTaps] = {
-      term.t.weights[0], term.t.weights[1], term.t.weights[2], term.t.weights[3]};
-  const float* const slopes[kSumTaps] = {
-      term.t.slopes[0], term.t.slopes[1], term.t.slopes[2], term.t.slopes[3]};
   const int64_t stride = term.stride;
   const int64_t first = term.t.first[r] * stride;
+  Floats weights[kSumTaps];
+  Floats slopes[kSumTaps];
+  for (int tap = 0; tap < kSumTaps; ++tap) {
+    weights[tap] = splat(term.t.weights[tap][r]);
+    slopes[tap] = splat(term.t.slopes[tap][r]);
+  }
+  Floats values[kSumTaps];
+  const auto take_column = [&](int image, int32_t c) {
+    for (int tap = 0; tap < kSumTaps; ++tap)
+      values[tap] = load(term.images[image] + first + tap * stride + c);
+  };
   for (int32_t c = 0; c < term.columns; c += kLanes) {
-    const float* const value = term.images[0] + first;
-    store(term.rows[0] + c, weighted_rows(value, stride, weights, r, c));
+    take_column(0, c);
+    store(term.rows[0] + c, weighted(weights, values));
     if (!kWithSlopes) continue;
-    store(term.rows[1] + c, weighted_rows(term.images[1] + first, stride, weights, r, c));
-    store(term.rows[2] + c,
-          weighted_rows(term.images[2] + first, stride, weights, r, c) +
-              term.drift[1] * weighted_rows(value, stride, slopes, r, c));
+    const Floats moved = term.drift[1] * weighted(slopes, values);
+    take_column(1, c);
+    store(term.rows[1] + c, weighted(weights, values));
+    take_column(2, c);
+    store(term.rows[2] + c, weighted(weights, values) + moved);
   }
 }
 
@@ -56,7 +60,8 @@ struct Window {
   int32_t base;
   Ints lane;
   bool is_even;  ///< the nodes of neighbouring columns are neighbours
-  bool fits;     ///< two vectors from `base` on hold all of them
+  bool is_near;  ///< a vector from `base` on holds all first taps
+  bool fits;     ///< two vectors from `base` on hold all taps
 };
 
 AF_KERNEL_INLINE Window window_of(const int32_t* first) {
@@ -66,6 +71,7 @@ AF_KERNEL_INLINE Window window_of(const int32_t* first) {
   return {first[0],
           lane,
           span == kLanes - 1 && !native::any(lane != native::lane_numbers()),
+          span < kLanes,
           span + kSumTaps <= 2 * kLanes};
 }
 
@@ -77,6 +83,11 @@ AF_KERNEL_INLINE void take(const Window& window, const float* row, Floats (&valu
     return;
   }
 #if AF_VECTOR_BITS >= 256
+  if (window.is_near) {
+    for (int tap = 0; tap < kSumTaps; ++tap)
+      values[tap] = native::pick(load(from + tap), window.lane);
+    return;
+  }
   if (window.fits) {
     const Floats low = load(from);
     const Floats high = load(from + kLanes);
@@ -86,13 +97,6 @@ AF_KERNEL_INLINE void take(const Window& window, const float* row, Floats (&valu
   }
 #endif
   for (int tap = 0; tap < kSumTaps; ++tap) values[tap] = native::gather(from + tap, window.lane);
-}
-
-AF_KERNEL_INLINE Floats weighted(const Floats (&weights)[kSumTaps],
-                                 const Floats (&values)[kSumTaps]) {
-  Floats sum = splat(0.0f);
-  for (int tap = 0; tap < kSumTaps; ++tap) sum += weights[tap] * values[tap];
-  return sum;
 }
 
 AF_KERNEL_INLINE void put(const SlabTerm& term, int image, int64_t at, Floats value) {
