@@ -411,6 +411,37 @@ AF_KERNEL_INLINE bool any(Ints mask) {
   return bits_of(mask) != 0;
 }
 
+/// Every lane's value from the lane whose number differs in bit `kStride`.
+template <int kStride>
+AF_KERNEL_INLINE Floats exchanged(Floats values) {
+  constexpr int k = kStride;
+#if AF_VECTOR_BITS == 512
+  return __builtin_shufflevector(values,
+                                 values,
+                                 0 ^ k,
+                                 1 ^ k,
+                                 2 ^ k,
+                                 3 ^ k,
+                                 4 ^ k,
+                                 5 ^ k,
+                                 6 ^ k,
+                                 7 ^ k,
+                                 8 ^ k,
+                                 9 ^ k,
+                                 10 ^ k,
+                                 11 ^ k,
+                                 12 ^ k,
+                                 13 ^ k,
+                                 14 ^ k,
+                                 15 ^ k);
+#elif AF_VECTOR_BITS == 256
+  return __builtin_shufflevector(
+      values, values, 0 ^ k, 1 ^ k, 2 ^ k, 3 ^ k, 4 ^ k, 5 ^ k, 6 ^ k, 7 ^ k);
+#else
+  return __builtin_shufflevector(values, values, 0 ^ k, 1 ^ k, 2 ^ k, 3 ^ k);
+#endif
+}
+
 /// The smallest of 16 lanes.
 AF_KERNEL_INLINE float smallest(const Floats (&parts)[16 / kLanes]) {
 #if AF_VECTOR_BITS == 512

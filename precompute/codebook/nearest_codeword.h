@@ -27,8 +27,8 @@ enum class SearchHint {
 ///
 /// Shapes have no coefficient as informative as the DC of plain tiles. A balanced tree halves them
 /// at the median of the coefficient that varies most, down to blocks of 16. The ranges of eight
-/// coefficients in each part bound the distance of its codewords; parts are visited nearest first,
-/// until none can hold a nearer codeword.
+/// coefficients in each part bound the distance of its codewords; parts are visited nearest first
+/// (of the last ones, only the first of 16), until none can hold a nearer codeword.
 class NearestCodeword {
  public:
   /// Searches for plain tiles or, where the codebook has means, for folded shapes (remove_mean()).

@@ -6,8 +6,6 @@
 
 namespace af::AF_KERNEL_NAMESPACE {
 
-using namespace lanes16;
-
 namespace {
 
 /// Sixteen lanes in the registers of one width: GCC keeps vectors of several registers in memory.
@@ -32,29 +30,6 @@ AF_KERNEL_INLINE void set_lane(Lanes& lanes, uint32_t lane, float value) {
   }
 }
 
-/// Every lane's value from the lane whose number differs in bit `kStride`.
-template <int kStride, typename Vector>
-AF_KERNEL_INLINE Vector exchanged(Vector values) {
-  return __builtin_shufflevector(values,
-                                 values,
-                                 0 ^ kStride,
-                                 1 ^ kStride,
-                                 2 ^ kStride,
-                                 3 ^ kStride,
-                                 4 ^ kStride,
-                                 5 ^ kStride,
-                                 6 ^ kStride,
-                                 7 ^ kStride,
-                                 8 ^ kStride,
-                                 9 ^ kStride,
-                                 10 ^ kStride,
-                                 11 ^ kStride,
-                                 12 ^ kStride,
-                                 13 ^ kStride,
-                                 14 ^ kStride,
-                                 15 ^ kStride);
-}
-
 /// Exact: 16 squares below 2^32 each.
 AF_KERNEL_INLINE uint64_t squared_error(const uint16_t* a, const uint16_t* b) {
   uint64_t sum = 0;
@@ -66,42 +41,39 @@ AF_KERNEL_INLINE uint64_t squared_error(const uint16_t* a, const uint16_t* b) {
   return sum;
 }
 
+/// Sums of lanes whose numbers differ in bit `kStride`, and differences in those that have it.
 template <int kStride>
-AF_KERNEL_INLINE Ints16 butterfly(Ints16 values) {
-  const Ints16 lanes = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
-  const Ints16 is_upper = lanes & splat(int32_t{kStride});
-  const Ints16 other = exchanged<kStride>(values);
-  return is_upper != 0 ? other - values : values + other;
+AF_KERNEL_INLINE void butterfly(Lanes& values) {
+  if constexpr (kStride >= native::kLanes) {
+    constexpr int kApart = kStride / native::kLanes;
+    for (int i = 0; i < kParts; ++i) {
+      if ((i & kApart) != 0) continue;
+      const native::Floats lower = values.part[i];
+      values.part[i] += values.part[i + kApart];
+      values.part[i + kApart] = lower - values.part[i + kApart];
+    }
+  } else {
+    const auto is_upper = (native::lane_numbers() & kStride) != 0;
+    for (native::Floats& part : values.part) {
+      const native::Floats other = native::exchanged<kStride>(part);
+      part = is_upper ? other - part : part + other;
+    }
+  }
 }
 
 /// 4-D Hadamard transform of a tile, its coefficients in the order stated; integers below 2^21,
-/// exact also as floats.
+/// exact as floats.
 template <const uint32_t (&kOrder)[16]>
 AF_KERNEL_INLINE void hadamard(const uint16_t* tile, float* coefficients) {
-  using Levels = uint16_t __attribute__((vector_size(32)));
-  Levels levels;
-  memcpy(&levels, tile, sizeof(levels));
-  const Ints16 values = butterfly<8>(
-      butterfly<4>(butterfly<2>(butterfly<1>(__builtin_convertvector(levels, Ints16)))));
-  const Ints16 ordered = __builtin_shufflevector(values,
-                                                 values,
-                                                 kOrder[0],
-                                                 kOrder[1],
-                                                 kOrder[2],
-                                                 kOrder[3],
-                                                 kOrder[4],
-                                                 kOrder[5],
-                                                 kOrder[6],
-                                                 kOrder[7],
-                                                 kOrder[8],
-                                                 kOrder[9],
-                                                 kOrder[10],
-                                                 kOrder[11],
-                                                 kOrder[12],
-                                                 kOrder[13],
-                                                 kOrder[14],
-                                                 kOrder[15]);
-  store(coefficients, to_float(ordered));
+  Lanes values;
+  for (int i = 0; i < kParts; ++i) values.part[i] = native::load(tile + i * native::kLanes);
+  butterfly<8>(values);
+  butterfly<4>(values);
+  butterfly<2>(values);
+  butterfly<1>(values);
+  float in_turn[16];
+  memcpy(in_turn, &values, sizeof(in_turn));
+  for (int i = 0; i < 16; ++i) coefficients[i] = in_turn[kOrder[i]];
 }
 
 /// The best codeword of one tile so far, and the bound that a better one must meet.
@@ -222,6 +194,26 @@ AF_KERNEL_INLINE Lanes distances(const CodewordBox& box, const float* coefficien
   return sum;
 }
 
+/// Visits the blocks of a box, of which `nearest` is the nearest, while they may hold a codeword
+/// that is as near as the best. The nearest leaves few others, which come in any order.
+AF_KERNEL_INLINE void search_blocks_of_box(const CodewordBlocks& blocks,
+                                           uint32_t box,
+                                           const Lanes& to_blocks,
+                                           uint32_t nearest,
+                                           const uint16_t* tile,
+                                           const float* coefficients,
+                                           Best& best) {
+  search_block(blocks, 16 * box + nearest, tile, coefficients, best);
+  float distance[16];
+  memcpy(distance, &to_blocks, sizeof(distance));
+  uint32_t left = bits_within(to_blocks, best.limit) & ~(1u << nearest);
+  for (; left != 0; left &= left - 1) {
+    const auto lane = static_cast<uint32_t>(__builtin_ctz(left));
+    if (distance[lane] <= best.limit)
+      search_block(blocks, 16 * box + lane, tile, coefficients, best);
+  }
+}
+
 /// Beyond any limit.
 constexpr float kVisited = 3e38f;
 
@@ -242,12 +234,14 @@ AF_KERNEL_INLINE Best search_boxes(const CodewordBlocks& blocks, const uint16_t*
     }
     const auto lane =
         static_cast<uint32_t>(__builtin_ctz(bits_within(to_children[level], nearest)));
-    set_lane(to_children[level], lane, kVisited);
-    const uint32_t child = 16 * numbers[level] + lane;
     if (level == last) {
-      search_block(blocks, child, tile, coefficients, best);
+      search_blocks_of_box(
+          blocks, numbers[level], to_children[level], lane, tile, coefficients, best);
+      --level;
       continue;
     }
+    set_lane(to_children[level], lane, kVisited);
+    const uint32_t child = 16 * numbers[level] + lane;
     ++level;
     numbers[level] = child;
     to_children[level] = distances(blocks.boxes[level][child], coefficients);
