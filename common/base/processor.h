@@ -56,15 +56,9 @@ inline constexpr int kLanes = 16;
 
 using Floats16 = float __attribute__((vector_size(64)));
 using Ints16 = int32_t __attribute__((vector_size(64)));
-using UnsignedInts16 = uint32_t __attribute__((vector_size(64)));
-/// Thirty-two 16-bit lanes, for integer arithmetic on samples.
-using Shorts32 = int16_t __attribute__((vector_size(64)));
 
 AF_KERNEL_INLINE Floats16 splat(float value) {
   return value - Floats16{};
-}
-AF_KERNEL_INLINE Ints16 splat(int32_t value) {
-  return value - Ints16{};
 }
 
 template <typename Vector, typename Element>
@@ -74,46 +68,6 @@ AF_KERNEL_INLINE Vector load(const Element* from) {
   memcpy(&vector, from, sizeof(vector));
   return vector;
 }
-
-template <typename Vector, typename Element>
-AF_KERNEL_INLINE void store(Element* to, Vector vector) {
-  static_assert(sizeof(Vector) == 64 && sizeof(Vector{}[0]) == sizeof(Element));
-  memcpy(to, &vector, sizeof(vector));
-}
-
-/// Truncation towards zero.
-AF_KERNEL_INLINE Ints16 to_int(Floats16 value) {
-  return __builtin_convertvector(value, Ints16);
-}
-AF_KERNEL_INLINE Floats16 to_float(Ints16 value) {
-  return __builtin_convertvector(value, Floats16);
-}
-
-/// Registers that make up one vector.
-inline constexpr int kRegisters = 512 / AF_VECTOR_BITS;
-
-#define AF_DEFINE_OPERATION(name, operation, Register, Result, Operand)                        \
-  AF_KERNEL_INLINE Result name(Operand a, Operand b) {                                         \
-    Register left[kRegisters];                                                                 \
-    Register right[kRegisters];                                                                \
-    memcpy(left, &a, sizeof(left));                                                            \
-    memcpy(right, &b, sizeof(right));                                                          \
-    for (int i = 0; i < kRegisters; ++i) left[i] = AF_INTRINSIC(operation)(left[i], right[i]); \
-    Result result;                                                                             \
-    memcpy(&result, left, sizeof(result));                                                     \
-    return result;                                                                             \
-  }
-
-/// a < b ? a : b per lane.
-AF_DEFINE_OPERATION(minimum, min_ps, FloatRegister, Floats16, Floats16)
-AF_DEFINE_OPERATION(minimum, min_epi32, IntegerRegister, Ints16, Ints16)
-/// a > b ? a : b per lane.
-AF_DEFINE_OPERATION(maximum, max_ps, FloatRegister, Floats16, Floats16)
-AF_DEFINE_OPERATION(maximum, max_epi32, IntegerRegister, Ints16, Ints16)
-/// Saturated to 0 ... 65535 (as bits); within each group of 8 lanes: a's four, then b's four.
-AF_DEFINE_OPERATION(pack_unsigned, packus_epi32, IntegerRegister, Shorts32, Ints16)
-
-#undef AF_DEFINE_OPERATION
 
 /// True when any lane of a comparison's result is set.
 AF_KERNEL_INLINE bool any(Ints16 mask) {
@@ -169,14 +123,6 @@ AF_KERNEL_INLINE Floats16 multiply_add(Floats16 a, Floats16 b, Floats16 sum) {
 #else
   return sum + a * b;
 #endif
-}
-
-AF_KERNEL_INLINE Floats16 square_root(Floats16 value) {
-  FloatRegister parts[kRegisters];
-  memcpy(parts, &value, sizeof(parts));
-  for (int i = 0; i < kRegisters; ++i) parts[i] = AF_INTRINSIC(sqrt_ps)(parts[i]);
-  memcpy(&value, parts, sizeof(value));
-  return value;
 }
 
 }  // namespace lanes16
@@ -339,6 +285,9 @@ AF_KERNEL_INLINE void add_mean(const uint16_t* shape, uint16_t mean, uint16_t* l
   }
 }
 
+AF_KERNEL_INLINE Floats square_root(Floats value) {
+  return AF_INTRINSIC(sqrt_ps)(value);
+}
 AF_KERNEL_INLINE Doubles square_root(Doubles value) {
   return AF_INTRINSIC(sqrt_pd)(value);
 }
@@ -358,6 +307,11 @@ AF_KERNEL_INLINE Ints maximum(Ints a, Ints b) {
 /// a > b ? a : b per lane.
 AF_KERNEL_INLINE Floats maximum(Floats a, Floats b) {
   return AF_INTRINSIC(max_ps)(a, b);
+}
+
+/// 16-bit lanes, saturated to 0 ... 65535; within each group of 128 bits a's four, then b's.
+AF_KERNEL_INLINE Register pack_unsigned(Ints a, Ints b) {
+  return AF_INTRINSIC(packus_epi32)(reinterpret_cast<Register>(a), reinterpret_cast<Register>(b));
 }
 
 /// base[offset] per lane.

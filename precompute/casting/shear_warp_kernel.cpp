@@ -5,8 +5,6 @@
 
 namespace af::AF_KERNEL_NAMESPACE {
 
-using namespace lanes16;
-
 namespace {
 
 AF_KERNEL_INLINE native::Floats mix(native::Floats a, native::Floats b, native::Floats weight) {
@@ -69,7 +67,9 @@ AF_KERNEL_INLINE const int16_t* block_of(const int16_t* values, const ShearRow& 
 }
 
 /// 16-bit lanes of one register.
-constexpr int kRegisterShorts = kShearColumns / kRegisters;
+constexpr int kRegisterShorts = 2 * native::kLanes;
+/// Half the sums of a node: from here on are those of the last four columns of each eight.
+constexpr int kHalfOfSums = kShearColumns / 2;
 
 /// Eight columns from `group` on for the places of one register, from x + `first` on. Registers one
 /// by one, because GCC keeps vectors of several in memory.
@@ -183,29 +183,24 @@ void accumulate_nodes(const int16_t* buffer,
                       int32_t first_node,
                       int32_t end_node,
                       int32_t* sums) {
-  const Floats16 start = load<Floats16>(block.start);
-  const Floats16 step = load<Floats16>(block.step);
-  const Floats16 low = load<Floats16>(block.low);
-  const Floats16 high = load<Floats16>(block.high);
-  const Ints16 origin = load<Ints16>(block.origin);
+  using native::Floats;
+  using native::Ints;
   int32_t offsets[kShearSlices];
   int32_t weights[kShearSlices];
   for (int32_t node = first_node; node < end_node; ++node, sums += kShearColumns) {
-    const Ints16 x = to_int(minimum(maximum(start + step * static_cast<float>(node), low), high));
-    store(offsets, (x >> 8) * kShearColumns + origin);
-    const Ints16 weight = x & 255;
-    store(weights, (256 - weight) | (weight << 16));
+    for (int k = 0; k < kShearSlices; k += native::kLanes) {
+      const Floats at =
+          native::load(block.start + k) + native::load(block.step + k) * static_cast<float>(node);
+      const Ints x = native::to_int(native::minimum(
+          native::maximum(at, native::load(block.low + k)), native::load(block.high + k)));
+      native::store(offsets + k, (x >> 8) * kShearColumns + native::load(block.origin + k));
+      const Ints weight = x & 255;
+      native::store(weights + k, (256 - weight) | (weight << 16));
+    }
     // Through memory on purpose: loads that broadcast are cheaper than taking registers apart.
     asm volatile("" : : : "memory");
-    for (int i = 0; i < kRegisters; ++i) {
-      int32_t* low_sums = sums + i * kLanes / kRegisters;
-      add_slices(buffer + i * kShearColumns / kRegisters,
-                 offsets,
-                 weights,
-                 block.slices,
-                 low_sums,
-                 low_sums + kLanes);
-    }
+    for (int i = 0; i < kHalfOfSums; i += native::kLanes)
+      add_slices(buffer + 2 * i, offsets, weights, block.slices, sums + i, sums + kHalfOfSums + i);
   }
 }
 
@@ -213,17 +208,19 @@ void quantize_node(const int32_t* sums,
                    const ShearScale& scale,
                    float slope_squared_s,
                    uint16_t* samples) {
-  Ints16 levels[2];
-  for (int half = 0; half < 2; ++half) {
-    const Floats16 slope_squared =
-        load<Floats16>(scale.slope_squared_t + half * kLanes) + slope_squared_s;
-    const Floats16 total_attenuation = to_float(load<Ints16>(sums + half * kLanes)) *
-                                       scale.attenuation_per_sum *
-                                       square_root(slope_squared + 1.0f);
-    const Floats16 level = total_attenuation / scale.quantizer_step + 0.5f;
-    levels[half] = to_int(minimum(level, splat(65535.0f)));
+  using native::Floats;
+  const auto levels = [&](int first) {
+    const Floats slope_squared = native::load(scale.slope_squared_t + first) + slope_squared_s;
+    const Floats total_attenuation = native::to_float(native::load(sums + first)) *
+                                     scale.attenuation_per_sum *
+                                     native::square_root(slope_squared + 1.0f);
+    const Floats level = total_attenuation / scale.quantizer_step + 0.5f;
+    return native::to_int(native::minimum(level, native::splat(65535.0f)));
+  };
+  for (int i = 0; i < kHalfOfSums; i += native::kLanes) {
+    const native::Register packed = native::pack_unsigned(levels(i), levels(kHalfOfSums + i));
+    memcpy(samples + 2 * i, &packed, sizeof(packed));
   }
-  store(reinterpret_cast<int16_t*>(samples), pack_unsigned(levels[0], levels[1]));
 }
 
 }  // namespace af::AF_KERNEL_NAMESPACE
