@@ -160,23 +160,29 @@ void check_values(const CtGrid& grid,
                      "HU must be within 1e6 (" + std::to_string(values.implausible_count()) +
                          " voxels are beyond)",
                      file);
-  const auto [low, high] = std::minmax_element(values.hu().begin(), values.hu().end());
-  if (*high < kAirBelowHu)
+  // By value, which is vectorised.
+  std::int16_t low = values.hu().front();
+  std::int16_t high = low;
+  for (const std::int16_t hu : values.hu()) {
+    low = std::min(low, hu);
+    high = std::max(high, hu);
+  }
+  if (high < kAirBelowHu)
     throw InputError(
         "highest HU",
-        std::to_string(*high),
+        std::to_string(high),
         "nothing but air: some voxel must reach " + std::to_string(kAirBelowHu) + " HU",
         file);
   if (values.clamped_count() > 0)
     warnings.push_back(file + ": " + std::to_string(values.clamped_count()) +
                        " voxels beyond int16 were clamped");
   if (options.values != "hu") return;
-  const std::string range = std::to_string(*low) + " to " + std::to_string(*high);
-  if (*low >= -200)
+  const std::string range = std::to_string(low) + " to " + std::to_string(high);
+  if (low >= -200)
     warnings.push_back(file + ": values " + range +
                        " do not look like HU: no voxel is near air (-1000); --values says what "
                        "else they are (ct_values in a study)");
-  else if (*high < 100)
+  else if (high < 100)
     warnings.push_back(file + ": values " + range + " do not look like a CT of a body: no bone");
 }
 
@@ -249,13 +255,6 @@ CtGrid reordered(const CtGrid& grid, const AxisOrder& order) {
   result.origin_mm = grid.point_mm(first_index(grid, order));
   result.direction = reordered(grid.direction, order);
   return result;
-}
-
-template <typename T>
-void append_little_endian(std::vector<std::byte>& bytes, T value) {
-  const std::uint64_t bits = static_cast<std::make_unsigned_t<T>>(value);
-  for (std::size_t i = 0; i < sizeof(T); ++i)
-    bytes.push_back(static_cast<std::byte>(bits >> (8 * i) & 0xffU));
 }
 
 RawImage raw_image_of(const CtVolume& ct) {
@@ -358,18 +357,19 @@ CtIdentity identity_of(const CtVolume& ct) {
     step[world] = order.reversed[world] ? -stride[from] : stride[from];
     if (order.reversed[world]) first += stride[from] * (size[world] - 1);
   }
+  static_assert(std::endian::native == std::endian::little, "numbers are hashed low byte first");
   Sha256 hash;
-  std::vector<std::byte> bytes;
-  for (const int extent : size) append_little_endian(bytes, static_cast<std::int32_t>(extent));
-  hash.update(bytes);
+  hash.update(std::as_bytes(std::span(size)));
+  std::vector<std::int16_t> slice(static_cast<std::size_t>(size[0]) *
+                                  static_cast<std::size_t>(size[1]));
   const std::int16_t* hu = ct.hu.data();
   for (int k = 0; k < size[2]; ++k) {
-    bytes.clear();
+    auto to = slice.begin();
     for (int j = 0; j < size[1]; ++j) {
       const std::int16_t* row = hu + first + k * step[2] + j * step[1];
-      for (int i = 0; i < size[0]; ++i) append_little_endian(bytes, row[i * step[0]]);
+      for (int i = 0; i < size[0]; ++i) *to++ = row[i * step[0]];
     }
-    hash.update(bytes);
+    hash.update(std::as_bytes(std::span(slice)));
   }
   return {hash.hex_digest(), grid};
 }
