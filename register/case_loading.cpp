@@ -15,6 +15,7 @@
 #include "ranks/root_only.h"
 #include "register/case_renderers.h"
 #include "register/kept_fields.h"
+#include "register/method/prepared_stage.h"
 #include "register/problem/fiducial_mask.h"
 #include "register/problem/pose_target.h"
 #include "study/ct_keys.h"
@@ -389,6 +390,10 @@ LoadedCase load_case(const Study& study,
       view.coarse_levels = levels;
     }
   }
+
+  all_or_none(communicator, [&] {
+    for (RegistrationView& view : problem->views) view.drr_range = drr_range_of(*problem, view);
+  });
 
   if (ct.has_value()) {
     loaded.inputs["ct"] = ct->identity;

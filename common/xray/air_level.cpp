@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "base/error.h"
 #include "xray/quantile.h"
@@ -36,7 +37,6 @@ double half_step(const std::vector<float>& values, double air_level) {
 }
 
 std::vector<float> used_values(const Image2d& image, const Image2d& mask) {
-  if (mask.pixels.empty()) return image.pixels;
   std::vector<float> values;
   for (std::size_t i = 0; i < image.pixels.size(); ++i)
     if (mask.pixels[i] != 0.0f) values.push_back(image.pixels[i]);
@@ -78,7 +78,7 @@ std::optional<AirLevel> open_beam_peak(const std::vector<float>& intensities) {
         peak.push_back(value);
     if (peak.empty()) return std::nullopt;
     const double share = static_cast<double>(peak.size()) / static_cast<double>(intensities.size());
-    return AirLevel{static_cast<double>(nearest_rank(std::move(peak), 0.5)), share};
+    return AirLevel{static_cast<double>(nearest_rank(peak, 0.5)), share};
   }
   return std::nullopt;
 }
@@ -103,15 +103,11 @@ Background background_of(const Image2d& image, const Image2d& mask) {
   constexpr double kHigh = 0.99;
   constexpr double kBright = 0.75;
   constexpr double kDark = 0.25;
-  Image2d everything;
-  if (mask.pixels.empty()) {
-    everything = Image2d(image.width, image.height);
-    std::fill(everything.pixels.begin(), everything.pixels.end(), 1.0f);
-  }
-  const Image2d& field = mask.pixels.empty() ? everything : mask;
-  const std::vector<float> values = used_values(image, field);
+  std::vector<float> in_field;
+  if (!mask.pixels.empty()) in_field = used_values(image, mask);
+  const std::vector<float>& values = mask.pixels.empty() ? image.pixels : in_field;
   const int width_px = std::max(2, std::min(image.width, image.height) / 32);
-  const std::vector<float> edge = values_along_edge(image, field, width_px);
+  const std::vector<float> edge = values_along_edge(image, mask, width_px);
   if (values.empty() || edge.empty()) return Background::Undecided;
   const auto low = static_cast<double>(nearest_rank(values, kLow));
   const auto high = static_cast<double>(nearest_rank(values, kHigh));
@@ -169,10 +165,27 @@ Image2d flat_corrected(const Image2d& image, const Image2d& flat, const Image2d&
 }
 
 void take_negative_log(Image2d& image, double air_level) {
-  const double zero = half_step(image.pixels, air_level);
+  const auto attenuation = [&](double intensity) {
+    return static_cast<float>(-std::log(intensity / air_level));
+  };
+  const bool has_dark_pixels = !std::ranges::all_of(image.pixels, [](float v) { return v > 0.0f; });
+  const float of_dark = has_dark_pixels ? attenuation(half_step(image.pixels, air_level)) : 0.0f;
+  // Detectors count in grey levels, of which there are fewer than pixels.
+  constexpr int kLevels = 65536;
+  std::vector<float> of_level(kLevels, std::numeric_limits<float>::quiet_NaN());
   for (float& pixel : image.pixels) {
-    const double intensity = pixel > 0.0f ? static_cast<double>(pixel) : zero;
-    pixel = static_cast<float>(-std::log(intensity / air_level));
+    if (!(pixel > 0.0f)) {
+      pixel = of_dark;
+      continue;
+    }
+    const int level = pixel < static_cast<float>(kLevels) ? static_cast<int>(pixel) : 0;
+    if (static_cast<float>(level) != pixel) {
+      pixel = attenuation(static_cast<double>(pixel));
+      continue;
+    }
+    float& known = of_level[static_cast<std::size_t>(level)];
+    if (std::isnan(known)) known = attenuation(static_cast<double>(pixel));
+    pixel = known;
   }
 }
 

@@ -9,4 +9,7 @@ namespace af {
 /// sum 1, edges replicated. sigma_px <= 0 returns the image unchanged.
 Image2d gaussian_blur(const Image2d& image, double sigma_px);
 
+/// How many pixels away a value still counts; 0 for sigma_px <= 0.
+int blur_radius_px(double sigma_px);
+
 }  // namespace af

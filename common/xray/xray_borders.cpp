@@ -545,41 +545,46 @@ XrayBorders find_xray_borders(const Image2d& intensity) {
 }
 
 std::vector<float> values_along_edge(const Image2d& intensity, const Image2d& mask, int width_px) {
-  check(mask.width == intensity.width && mask.height == intensity.height,
+  check(mask.pixels.empty() || (mask.width == intensity.width && mask.height == intensity.height),
         "a mask has the size of its image");
-  // Steps to the nearest masked pixel or the outside, by rows and then by columns.
-  const int far = width_px + 1;
-  std::vector<int> steps(mask.pixels.size(), 0);
-  const auto index = [&](int column, int row) {
-    return static_cast<std::size_t>(row) * static_cast<std::size_t>(mask.width) +
+  const int width = intensity.width;
+  const int height = intensity.height;
+  std::vector<float> values;
+  const auto at = [&](int column, int row) {
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
            static_cast<std::size_t>(column);
   };
-  for (int row = 0; row < mask.height; ++row) {
-    int since = 0;
-    for (int column = 0; column < mask.width; ++column) {
-      since = mask.at(column, row) == 0.0f ? 0 : std::min(far, since + 1);
-      steps[index(column, row)] = since;
-    }
-    since = 0;
-    for (int column = mask.width - 1; column >= 0; --column) {
-      since = mask.at(column, row) == 0.0f ? 0 : std::min(far, since + 1);
-      steps[index(column, row)] = std::min(steps[index(column, row)], since);
-    }
+  if (mask.pixels.empty()) {
+    for (int row = 0; row < height; ++row)
+      for (int column = 0; column < width; ++column)
+        if (std::min({column, row, width - 1 - column, height - 1 - row}) < width_px)
+          values.push_back(intensity.pixels[at(column, row)]);
+    return values;
   }
-  std::vector<float> values;
-  for (int column = 0; column < mask.width; ++column) {
-    const auto nearest = [&](int row) {
-      int least = std::min({steps[index(column, row)], row + 1, mask.height - row});
-      for (int other = std::max(0, row - width_px);
-           other <= std::min(mask.height - 1, row + width_px);
-           ++other)
-        if (mask.at(column, other) == 0.0f) least = std::min(least, std::abs(other - row));
-      return least;
-    };
-    for (int row = 0; row < mask.height; ++row)
-      if (mask.at(column, row) != 0.0f && nearest(row) <= width_px)
-        values.push_back(intensity.at(column, row));
+  // Steps to the nearest masked pixel or the outside, along rows and along columns.
+  const int far = width_px + 1;
+  std::vector<int> steps(intensity.pixels.size(), far);
+  std::vector<int> down(static_cast<std::size_t>(width), 0);
+  std::vector<int> up(down);
+  const auto walk = [&](int column, int row, int& across, int& along) {
+    const std::size_t pixel = at(column, row);
+    const bool is_masked = mask.pixels[pixel] == 0.0f;
+    across = is_masked ? 0 : std::min(far, across + 1);
+    along = is_masked ? 0 : std::min(far, along + 1);
+    steps[pixel] = std::min({steps[pixel], across, along});
+  };
+  for (int row = 0; row < height; ++row) {
+    int across = 0;
+    for (int column = 0; column < width; ++column)
+      walk(column, row, across, down[static_cast<std::size_t>(column)]);
   }
+  for (int row = height - 1; row >= 0; --row) {
+    int across = 0;
+    for (int column = width - 1; column >= 0; --column)
+      walk(column, row, across, up[static_cast<std::size_t>(column)]);
+  }
+  for (std::size_t i = 0; i < steps.size(); ++i)
+    if (steps[i] > 0 && steps[i] <= width_px) values.push_back(intensity.pixels[i]);
   return values;
 }
 

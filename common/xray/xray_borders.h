@@ -47,7 +47,8 @@ struct XrayBorders {
 XrayBorders find_xray_borders(const Image2d& intensity);
 
 /// Values of the pixels that lie in the field within `width_px` of its masked edge, or of the
-/// picture's edge where nothing is masked beside it. `mask` has the image's size.
+/// picture's edge where nothing is masked beside it. `mask` has the image's size; empty: nothing
+/// is.
 std::vector<float> values_along_edge(const Image2d& intensity, const Image2d& mask, int width_px);
 
 }  // namespace af

@@ -198,7 +198,7 @@ double median_response(const CalibratedScan& scan, int axis) {
   std::vector<float> responses;
   for (const JudgedView& row : scan.calibrated.views)
     responses.push_back(static_cast<float>(row.alignment.response[axis]));
-  return static_cast<double>(nearest_rank(std::move(responses), 0.5));
+  return static_cast<double>(nearest_rank(responses, 0.5));
 }
 
 /// What people should know before they trust the study, a line each.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <list>
 #include <string>
 #include <utility>
 
@@ -13,30 +14,43 @@
 namespace af::registration {
 namespace {
 
-/// Blocks of step x step pixels, the first one's corner at (column, row).
-struct BlockGrid {
-  int step;
-  int column;
-  int row;
-};
-
-/// Means (or minima) over blocks.
-Image2d block_image(const Image2d& image, const BlockGrid& grid, bool take_minimum) {
-  const int step = grid.step;
-  Image2d blocks((image.width - grid.column) / step, (image.height - grid.row) / step);
-  for (int row = 0; row < blocks.height; ++row)
-    for (int column = 0; column < blocks.width; ++column) {
-      double sum = 0.0;
-      float least = std::numeric_limits<float>::infinity();
-      for (int r = 0; r < step; ++r)
-        for (int c = 0; c < step; ++c) {
-          const float value = image.at(grid.column + column * step + c, grid.row + row * step + r);
-          sum += static_cast<double>(value);
-          least = std::min(least, value);
-        }
-      blocks.at(column, row) = take_minimum ? least : static_cast<float>(sum / (step * step));
+/// Means over blocks of step x step pixels: of the blocks of `part`, the first one's corner at
+/// (first.x, first.y).
+Image2d block_means(const Image2d& image,
+                    int step,
+                    const Eigen::Vector2i& first,
+                    const RegionOfInterest& part) {
+  Image2d blocks(part.width, part.height);
+  std::vector<double> sums(static_cast<std::size_t>(part.width));
+  for (int row = 0; row < part.height; ++row) {
+    std::fill(sums.begin(), sums.end(), 0.0);
+    for (int r = 0; r < step; ++r) {
+      const int image_row = first.y() + (part.row + row) * step + r;
+      const float* value =
+          &image
+               .pixels[static_cast<std::size_t>(image_row) * static_cast<std::size_t>(image.width) +
+                       static_cast<std::size_t>(first.x() + part.column * step)];
+      for (double& sum : sums)
+        for (int c = 0; c < step; ++c) sum += static_cast<double>(*value++);
     }
+    for (int column = 0; column < part.width; ++column)
+      blocks.at(column, row) =
+          static_cast<float>(sums[static_cast<std::size_t>(column)] / (step * step));
+  }
   return blocks;
+}
+
+/// Whether all pixels of each block of a region, which whole blocks fill, are used.
+std::vector<std::uint8_t> used_blocks(const Image2d& mask,
+                                      int step,
+                                      const RegionOfInterest& region) {
+  std::vector<std::uint8_t> used(region.pixel_count() / static_cast<std::size_t>(step * step), 1);
+  const int columns = region.width / step;
+  for (int row = 0; row < region.height; ++row)
+    for (int column = 0; column < region.width; ++column)
+      if (mask.at(region.column + column, region.row + row) == 0.0f)
+        used[static_cast<std::size_t>((row / step) * columns + column / step)] = 0;
+  return used;
 }
 
 /// First and count of detector pixels along one axis.
@@ -75,18 +89,6 @@ RegionOfInterest grown(const RegionOfInterest& roi, const Eigen::Vector2i& size_
   return {left, top, right - left, bottom - top};
 }
 
-ValueRange drr_range_at_nominal(const RegistrationProblem& problem, const RegistrationView& view) {
-  const View wide{view.view.camera, grown(view.view.roi, view.view.camera.size_px)};
-  std::int64_t rays_outside = 0;
-  const Image2d drr =
-      render_image(*view.renderer, problem.nominal_room_from_ct, wide, &rays_outside);
-  if (rays_outside > 0)
-    throw InputError(view_name(view) + "nominal_room_from_ct = a pose outside the field (" +
-                     RenderStatus{rays_outside}.text(wide) + "): must lie inside the field");
-  const auto [low, high] = std::minmax_element(drr.pixels.begin(), drr.pixels.end());
-  return {static_cast<double>(*low), static_cast<double>(*high)};
-}
-
 StageGrid stage_grid(const RegistrationProblem& problem,
                      const RegistrationView& view,
                      const StageOptions& stage) {
@@ -111,13 +113,14 @@ constexpr std::size_t kLeastPixelsToHideIn = 400;
 
 /// The X-ray of a stage with the markers hidden, if that leaves enough of it.
 SimilarityReference visible_reference(const RegistrationView& view, const StageGrid& grid) {
-  SimilarityReference plain = stage_reference(view.xray, view.mask, view.view, grid);
-  if (view.mask_without_markers.pixels.empty()) return plain;
-  SimilarityReference hidden =
-      stage_reference(view.xray, view.mask_without_markers, view.view, grid);
-  const auto used = static_cast<std::size_t>(std::count(hidden.used.begin(), hidden.used.end(), 1));
-  const std::size_t pixels = hidden.used.size();
-  return pixels >= kLeastPixelsToHideIn && 4 * used >= 3 * pixels ? hidden : plain;
+  SimilarityReference reference = stage_reference(view.xray, view.mask, view.view, grid);
+  if (view.mask_without_markers.pixels.empty()) return reference;
+  std::vector<std::uint8_t> hidden =
+      used_blocks(view.mask_without_markers, grid.pixel_step, scaled_region(view.view, grid));
+  const auto used = static_cast<std::size_t>(std::count(hidden.begin(), hidden.end(), 1));
+  const std::size_t pixels = hidden.size();
+  if (pixels >= kLeastPixelsToHideIn && 4 * used >= 3 * pixels) reference.used = std::move(hidden);
+  return reference;
 }
 
 /// The X-ray as a stage compares it with DRRs; InputError when nothing can be compared with it.
@@ -131,6 +134,25 @@ SimilarityReference prepare_reference(const RegistrationView& view,
   throw_if_any(found);
   return reference;
 }
+
+/// A view as several stages see it: most of a method's stages share their grids.
+class SeenView {
+ public:
+  SeenView(const RegistrationProblem& problem, const RegistrationView& view)
+      : view_(view), drr_range_(view.drr_range ? *view.drr_range : drr_range_of(problem, view)) {}
+
+  [[nodiscard]] const RegistrationView& view() const { return view_; }
+  const SimilarityReference& reference(const StageGrid& grid) {
+    for (const auto& [known, reference] : references_)
+      if (known == grid) return reference;
+    return references_.emplace_back(grid, prepare_reference(view_, drr_range_, grid)).second;
+  }
+
+ private:
+  const RegistrationView& view_;
+  ValueRange drr_range_;
+  std::list<std::pair<StageGrid, SimilarityReference>> references_;
+};
 
 SimilarityOptions similarity_of(const StageOptions& stage) {
   SimilarityOptions similarity = stage.similarity;
@@ -160,17 +182,16 @@ SilhouetteView silhouette_view(const RegistrationProblem& problem,
   return {whole, reference, similarity_of(stage), view.renderer, margin_px};
 }
 
-/// `drr_ranges`: of the views.
 PreparedStage prepared_stage(const RegistrationProblem& problem,
                              const StageOptions& stage,
-                             std::span<const ValueRange> drr_ranges,
+                             std::span<SeenView> views,
                              const std::shared_ptr<ThreadPool>& pool) {
   std::vector<ObjectiveView> whole;
   std::vector<SilhouetteView> silhouettes;
-  for (std::size_t i = 0; i < problem.views.size(); ++i) {
-    const RegistrationView& view = problem.views[i];
+  for (SeenView& seen : views) {
+    const RegistrationView& view = seen.view();
     const StageGrid grid = stage_grid(problem, view, stage);
-    const SimilarityReference reference = prepare_reference(view, drr_ranges[i], grid);
+    const SimilarityReference& reference = seen.reference(grid);
     whole.push_back(prepare_view(view, reference, grid, stage));
     if (stage.silhouette_mm > 0.0)
       silhouettes.push_back(silhouette_view(problem, view, whole.back(), reference, stage));
@@ -182,6 +203,18 @@ PreparedStage prepared_stage(const RegistrationProblem& problem,
 }
 
 }  // namespace
+
+ValueRange drr_range_of(const RegistrationProblem& problem, const RegistrationView& view) {
+  const View wide{view.view.camera, grown(view.view.roi, view.view.camera.size_px)};
+  std::int64_t rays_outside = 0;
+  const Image2d drr =
+      render_image(*view.renderer, problem.nominal_room_from_ct, wide, &rays_outside);
+  if (rays_outside > 0)
+    throw InputError(view_name(view) + "nominal_room_from_ct = a pose outside the field (" +
+                     RenderStatus{rays_outside}.text(wide) + "): must lie inside the field");
+  const auto [low, high] = std::minmax_element(drr.pixels.begin(), drr.pixels.end());
+  return {static_cast<double>(*low), static_cast<double>(*high)};
+}
 
 View stage_view(const View& view, const StageGrid& grid) {
   check(grid.pixel_step >= 1, "a stage pixel has at least one detector pixel");
@@ -195,21 +228,26 @@ SimilarityReference stage_reference(const Image2d& xray,
                                     const StageGrid& grid) {
   const int step = grid.pixel_step;
   const RegionOfInterest region = scaled_region(view, grid);
-  const BlockGrid blocks{step, region.column % step, region.row % step};
+  // Blocks of the whole detector, and those of them that the region and its surroundings take.
+  const Eigen::Vector2i first(region.column % step, region.row % step);
+  const Eigen::Vector2i blocks((xray.width - first.x()) / step, (xray.height - first.y()) / step);
   const RegionOfInterest coarse{
       region.column / step, region.row / step, region.width / step, region.height / step};
   // A mean over n pixels blurs by a variance of (n^2 - 1) / 12 along each axis.
   const double missing = grid.blur_sigma_px * grid.blur_sigma_px - (step * step - 1) / 12.0;
   const double sigma = missing > 0.0 ? std::sqrt(missing) / step : 0.0;
+  const int radius = blur_radius_px(sigma);
+  const int left = std::max(0, coarse.column - radius);
+  const int top = std::max(0, coarse.row - radius);
+  const RegionOfInterest seen{left,
+                              top,
+                              std::min(blocks.x(), coarse.column + coarse.width + radius) - left,
+                              std::min(blocks.y(), coarse.row + coarse.height + radius) - top};
+  const Image2d means = step == 1 ? crop(xray, seen) : block_means(xray, step, first, seen);
   SimilarityReference reference;
-  reference.xray =
-      crop(gaussian_blur(step == 1 ? xray : block_image(xray, blocks, false), sigma), coarse);
-  if (mask.pixels.empty()) return reference;
-  Image2d used = mask;
-  for (float& value : used.pixels) value = value != 0.0f ? 1.0f : 0.0f;
-  used = crop(step == 1 ? used : block_image(used, blocks, true), coarse);
-  for (const float value : used.pixels)
-    reference.used.push_back(static_cast<std::uint8_t>(value != 0.0f ? 1 : 0));
+  reference.xray = crop(gaussian_blur(means, sigma),
+                        {coarse.column - left, coarse.row - top, coarse.width, coarse.height});
+  if (!mask.pixels.empty()) reference.used = used_blocks(mask, step, region);
   return reference;
 }
 
@@ -232,22 +270,23 @@ ObjectiveValue PreparedStage::value_at(const RegistrationProblem& problem,
 }
 
 std::vector<PreparedStage> prepared_stages(const RegistrationProblem& problem,
+                                           std::span<const RegistrationView> views,
                                            std::span<const StageOptions> stages,
                                            const std::shared_ptr<ThreadPool>& threads) {
   throw_if_any(problems(problem));
   int coarsest = 0;
   for (const StageOptions& stage : stages) coarsest = std::max(coarsest, stage.level);
-  for (const RegistrationView& view : problem.views)
+  for (const RegistrationView& view : views)
     if (static_cast<int>(view.coarse_levels.size()) < coarsest)
       throw InputError(view_name(view) +
                        "coarse_levels = " + std::to_string(view.coarse_levels.size()) +
                        ": the stages need " + std::to_string(coarsest));
-  std::vector<ValueRange> drr_ranges;
-  for (const RegistrationView& view : problem.views)
-    drr_ranges.push_back(drr_range_at_nominal(problem, view));
+  std::vector<SeenView> seen;
+  seen.reserve(views.size());
+  for (const RegistrationView& view : views) seen.emplace_back(problem, view);
   std::vector<PreparedStage> prepared;
   for (const StageOptions& stage : stages)
-    prepared.push_back(prepared_stage(problem, stage, drr_ranges, threads));
+    prepared.push_back(prepared_stage(problem, stage, seen, threads));
   return prepared;
 }
 

@@ -18,6 +18,8 @@ struct StageGrid {
   int pixel_step = 1;      ///< a stage pixel is the mean of pixel_step x pixel_step detector pixels
   double roi_scale = 1.0;  ///< the region's sides over those of the view's, about its centre
   double blur_sigma_px = 0.0;  ///< of the X-ray, in detector pixels, the mean's own blur included
+
+  bool operator==(const StageGrid&) const = default;
 };
 
 /// The view of a stage: the region, scaled about its centre and cut at the detector's edges, seen
@@ -52,11 +54,14 @@ struct PreparedStage {
                                         const RigidTransform& room_from_ct);
 };
 
-/// The stages of a method. InputError when the problem has problems or lacks their levels, when an
-/// X-ray has nothing that could be compared, and when the fields do not hold the nominal pose: each
-/// view's range of DRR values is that of its DRR there, over the region grown by half its size to
-/// every side.
+/// RegistrationView::drr_range of a view. InputError when its field does not hold the nominal pose.
+ValueRange drr_range_of(const RegistrationProblem& problem, const RegistrationView& view);
+
+/// The stages of a method, over some of the problem's views. InputError when the problem has
+/// problems or lacks their levels, when an X-ray has nothing that could be compared, and as
+/// drr_range_of().
 std::vector<PreparedStage> prepared_stages(const RegistrationProblem& problem,
+                                           std::span<const RegistrationView> views,
                                            std::span<const StageOptions> stages,
                                            const std::shared_ptr<ThreadPool>& threads);
 

@@ -38,6 +38,9 @@ struct RegistrationView {
   std::optional<MotionLimit> reach;
   /// [level] Ray casting, where a correction needs it; else none.
   std::vector<std::shared_ptr<const DrrRenderer>> ray_casts;
+  /// Of the DRR at the nominal pose, over the region grown by half its size to every side, which no
+  /// X-ray changes; none: whoever needs it makes that DRR.
+  std::optional<ValueRange> drr_range;
 
   /// The widest region that presets' stages and the judge look at: a ray that a field misses there
   /// makes a pose inadmissible.

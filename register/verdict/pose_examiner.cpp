@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "base/error.h"
 #include "base/sample_summary.h"
@@ -48,31 +49,34 @@ std::array<StageOptions, 2> judging_stages(const RegistrationView& view, double 
 /// None when the X-ray has no gradients over most of the region: the measure refuses it.
 std::optional<PoseExaminer::JudgedView> PoseExaminer::judged_view(
     const RegistrationProblem& problem, std::size_t view, double silhouette_mm) {
-  JudgedView judged{problem, {}};
-  judged.alone.views = {problem.views[view]};
+  const RegistrationView& judged = problem.views[view];
   try {
-    judged.stages =
-        prepared_stages(judged.alone, judging_stages(problem.views[view], silhouette_mm), nullptr);
+    return JudgedView{
+        judged.view.camera,
+        prepared_stages(problem, {&judged, 1}, judging_stages(judged, silhouette_mm), nullptr)};
   } catch (const InputError&) {
     return std::nullopt;
   }
-  return judged;
 }
 
-double PoseExaminer::JudgedView::share_at(std::size_t stage, const RigidTransform& room_from_ct) {
-  const double value = stages[stage].value_at(alone, room_from_ct).similarity;
+double PoseExaminer::share_at(std::size_t stage,
+                              const RigidTransform& room_from_ct,
+                              JudgedView& view) const {
+  std::vector<PreparedStage>& stages = view.stages;
+  const double value = stages[stage].value_at(*problem_, room_from_ct).similarity;
   return stages[stage].silhouettes.empty() ? value : share_of(value);
 }
 
-double PoseExaminer::JudgedView::share_beside(const RigidTransform& room_from_ct, double mm) {
-  const CameraGeometry& camera = alone.views.front().view.camera;
-  const PoseFrame frame = PoseFrame::about(room_from_ct, alone.center_ct_mm);
+double PoseExaminer::share_beside(const RigidTransform& room_from_ct,
+                                  double mm,
+                                  JudgedView& view) const {
+  const PoseFrame frame = PoseFrame::about(room_from_ct, problem_->center_ct_mm);
   std::vector<double> shares;
-  for (const Eigen::Vector3d& direction : {camera.column_direction, camera.row_direction})
+  for (const Eigen::Vector3d& direction : {view.camera.column_direction, view.camera.row_direction})
     for (const double way_mm : {-mm, mm}) {
       const RigidTransform beside =
           pose_from_parameters(frame, {.translation_mm = way_mm * direction});
-      const double share = share_at(kFine, beside);
+      const double share = share_at(kFine, beside, view);
       if (std::isfinite(share)) shares.push_back(share);
     }
   return mean_of(shares);
@@ -82,10 +86,10 @@ int PoseExaminer::coarsest_level() {
   return JudgeOptions().stage.level;
 }
 
-PoseExaminer::PoseExaminer(const RegistrationProblem& problem, double silhouette_mm)
-    : in_silhouette_(silhouette_mm > 0.0) {
-  for (std::size_t i = 0; i < problem.views.size(); ++i)
-    views_.push_back(judged_view(problem, i, silhouette_mm));
+PoseExaminer::PoseExaminer(std::shared_ptr<const RegistrationProblem> problem, double silhouette_mm)
+    : problem_(std::move(problem)), in_silhouette_(silhouette_mm > 0.0) {
+  for (std::size_t i = 0; i < problem_->views.size(); ++i)
+    views_.push_back(judged_view(*problem_, i, silhouette_mm));
 }
 
 std::vector<ViewValue> PoseExaminer::view_values(const RigidTransform& room_from_ct,
@@ -95,11 +99,11 @@ std::vector<ViewValue> PoseExaminer::view_values(const RigidTransform& room_from
   for (std::optional<JudgedView>& view : views_) {
     ViewValue& value = values.emplace_back(ViewValue{kNone, kNone, in_silhouette_});
     if (!view) continue;
-    value.coarse = view->share_at(kCoarse, room_from_ct);
-    value.fine = view->share_at(kFine, room_from_ct);
+    value.coarse = share_at(kCoarse, room_from_ct, *view);
+    value.fine = share_at(kFine, room_from_ct, *view);
     if (!with_backgrounds) continue;
     for (const double part : {1.0, 0.5, 0.25}) {
-      value.background = view->share_beside(room_from_ct, part * kBackgroundDistanceMm);
+      value.background = share_beside(room_from_ct, part * kBackgroundDistanceMm, *view);
       if (std::isfinite(value.background)) break;
     }
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -21,7 +22,7 @@ class PoseExaminer {
   /// `problem`: of the registration. `silhouette_mm`: the margin about the CT's silhouette
   /// within which poses are judged, by gradient correlation
   /// (RegistrationOptions::silhouette_mm()); 0: over twice the region.
-  PoseExaminer(const RegistrationProblem& problem, double silhouette_mm);
+  PoseExaminer(std::shared_ptr<const RegistrationProblem> problem, double silhouette_mm);
 
   /// One per view; NaN where the pose is outside a field, or the X-ray has no gradients to explain.
   /// `with_backgrounds`: also what the X-ray has in common with the CT wherever that is, the mean
@@ -34,19 +35,23 @@ class PoseExaminer {
 
  private:
   struct JudgedView {
-    RegistrationProblem alone;          ///< the problem with this view only
+    CameraGeometry camera;
     std::vector<PreparedStage> stages;  ///< coarse and fine, to be evaluated only
-
-    /// The share of the X-ray's gradients that a pose explains to a stage.
-    [[nodiscard]] double share_at(std::size_t stage, const RigidTransform& room_from_ct);
-    /// Mean share in detail over the poses that the field holds of four `mm` beside one; NaN for
-    /// none.
-    [[nodiscard]] double share_beside(const RigidTransform& room_from_ct, double mm);
   };
   static std::optional<JudgedView> judged_view(const RegistrationProblem& problem,
                                                std::size_t view,
                                                double silhouette_mm);
+  /// The share of the X-ray's gradients that a pose explains to a stage.
+  [[nodiscard]] double share_at(std::size_t stage,
+                                const RigidTransform& room_from_ct,
+                                JudgedView& view) const;
+  /// Mean share in detail over the poses that the field holds of four `mm` beside one; NaN for
+  /// none.
+  [[nodiscard]] double share_beside(const RigidTransform& room_from_ct,
+                                    double mm,
+                                    JudgedView& view) const;
 
+  std::shared_ptr<const RegistrationProblem> problem_;
   bool in_silhouette_ = false;
   std::vector<std::optional<JudgedView>> views_;  ///< none where nothing can be judged
 };

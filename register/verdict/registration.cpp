@@ -469,7 +469,7 @@ Registration::Registration(std::shared_ptr<const RegistrationProblem> of_problem
   all.insert(all.end(), method.finish.stages.begin(), method.finish.stages.end());
   const bool is_portfolio = method.chains.size() > 1;
   if (is_portfolio) all.push_back(method.judge.stage);
-  stages = prepared_stages(*problem, all, threads);
+  stages = prepared_stages(*problem, problem->views, all, threads);
   if (is_portfolio) {
     judge = std::move(stages.back());
     stages.pop_back();
@@ -481,7 +481,7 @@ Registration::Registration(std::shared_ptr<const RegistrationProblem> of_problem
 void Registration::examine_ends(const UncertaintyOptions& options,
                                 const std::shared_ptr<ThreadPool>& threads) {
   uncertainty.emplace(problem, method, options, threads);
-  examiner.emplace(*problem, method.silhouette_mm());
+  examiner.emplace(problem, method.silhouette_mm());
 }
 
 RegistrationResult Registration::search(const RigidTransform& start_room_from_ct,

@@ -64,7 +64,7 @@ UncertaintyEstimator::UncertaintyEstimator(std::shared_ptr<const RegistrationPro
     stage_of_chain_[chain.name] = ends.size() - 1;
   }
   try {
-    ends_ = prepared_stages(*problem_, ends, pool);
+    ends_ = prepared_stages(*problem_, problem_->views, ends, pool);
   } catch (const InputError&) {
     // rg, which replaces measures without derivative, rejects X-rays without gradients over most of
     // the region; the registration's own measure may accept them.

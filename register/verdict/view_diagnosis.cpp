@@ -141,7 +141,7 @@ std::optional<std::vector<ViewValue>> values_with(const Change& change,
     const RegistrationResult end = registration.search(changed->nominal_room_from_ct);
     // The judge of the chains' ends says the mean of the coarse values.
     if (!(end.similarity >= kLeastCoarseOfFound)) return std::nullopt;
-    return PoseExaminer(*changed, 0.0).view_values(end.room_from_ct);
+    return PoseExaminer(changed, 0.0).view_values(end.room_from_ct);
   } catch (const InputError&) {  // an X-ray without gradients
     return std::nullopt;
   }

@@ -156,7 +156,7 @@ TEST(SilhouetteStage, EndsWhereTheBodyIsNotSeen) {
   const RegistrationResult result = registration.search(small.gold_room_from_ct);
   EXPECT_EQ(result.stop_reason, StopReason::CtOutsideRoi);
   EXPECT_FALSE(registration.similarity_at(small.gold_room_from_ct).is_admissible);
-  const auto values = PoseExaminer(*small.problem, 5.0).view_values(small.gold_room_from_ct);
+  const auto values = PoseExaminer(small.problem, 5.0).view_values(small.gold_room_from_ct);
   for (const ViewValue& value : values) EXPECT_TRUE(value.in_silhouette);
 }
 

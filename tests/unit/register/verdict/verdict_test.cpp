@@ -123,7 +123,7 @@ RigidTransform beside_gold(const test::SmallCase& small, double mm) {
 
 TEST(PoseExaminer, TellsARightPoseFromAWrongOneInEveryView) {
   const test::SmallCase small = case_with_levels();
-  PoseExaminer examiner(*small.problem, 0.0);
+  PoseExaminer examiner(small.problem, 0.0);
   const auto right = examiner.view_values(small.gold_room_from_ct);
   const auto wrong = examiner.view_values(beside_gold(small, 8.0));
   ASSERT_EQ(right.size(), 2U);
@@ -136,7 +136,7 @@ TEST(PoseExaminer, TellsARightPoseFromAWrongOneInEveryView) {
 
 TEST(PoseExaminer, BackgroundIsFarBelowARightPose) {
   const test::SmallCase small = case_with_levels();
-  PoseExaminer examiner(*small.problem, 0.0);
+  PoseExaminer examiner(small.problem, 0.0);
   EXPECT_TRUE(std::isnan(examiner.view_values(small.gold_room_from_ct)[0].background));
   for (const ViewValue& value : examiner.view_values(small.gold_room_from_ct, true))
     EXPECT_LT(value.background, 0.3 * value.fine);
@@ -173,7 +173,7 @@ TEST(PoseExaminer, BackgroundIsTakenNearerWhereAFieldEnds) {
     for (RegistrationView& view : small.problem->views)
       view.renderer =
           std::make_shared<const test::NarrowDrr>(view.renderer, small.gold_room_from_ct, reach_mm);
-    return PoseExaminer(*small.problem, 0.0)
+    return PoseExaminer(small.problem, 0.0)
         .view_values(small.gold_room_from_ct, true)[0]
         .background;
   };
@@ -186,13 +186,13 @@ TEST(PoseExaminer, BackgroundIsTakenNearerWhereAFieldEnds) {
 TEST(PoseExaminer, DoesNotJudgeAnXrayWithoutGradients) {
   const test::SmallCase small = case_with_levels();
   for (float& value : small.problem->views[1].xray.pixels) value = 1.0f;
-  const auto values = PoseExaminer(*small.problem, 0.0).view_values(small.gold_room_from_ct);
+  const auto values = PoseExaminer(small.problem, 0.0).view_values(small.gold_room_from_ct);
   EXPECT_TRUE(std::isfinite(values[0].coarse));
   EXPECT_TRUE(std::isnan(values[1].coarse));
 }
 
 std::vector<ViewValue> values_at_gold(const test::SmallCase& small) {
-  return PoseExaminer(*small.problem, 0.0).view_values(small.gold_room_from_ct);
+  return PoseExaminer(small.problem, 0.0).view_values(small.gold_room_from_ct);
 }
 
 /// A case whose X-rays `harm` changed, its nominal pose beside the gold one.
