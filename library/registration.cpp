@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "attenuation_fields/registration.h"
 
+#include <algorithm>
 #include <cmath>
 #include <mutex>
 #include <utility>
@@ -97,6 +98,18 @@ registration::CaseLoadOptions load_options(const RegistrationOptions& options,
   return result;
 }
 
+/// InputError unless there is a value for every pixel of the camera.
+af::Image2d whole_detector(const af::CameraGeometry& camera, std::span<const float> pixels) {
+  af::Image2d image(camera.size_px.x(), camera.size_px.y());
+  if (pixels.size() != image.pixels.size())
+    throw af::InputError("X-ray of '" + camera.name + "'",
+                         std::to_string(pixels.size()) + " values",
+                         "must be " + std::to_string(image.width) + " x " +
+                             std::to_string(image.height) + ", the camera's pixels");
+  std::copy(pixels.begin(), pixels.end(), image.pixels.begin());
+  return image;
+}
+
 }  // namespace
 
 std::vector<std::string> preset_names() {
@@ -114,9 +127,28 @@ struct RegistrationCase::Impl {
   af::Study study;
   std::optional<af::GoldStandard> gold;
   std::vector<Eigen::Vector3d> target_points;
-  std::shared_ptr<const registration::RegistrationProblem> problem;
+  std::shared_ptr<af::ThreadPool> pool;
+  registration::UncertaintyOptions uncertainty;
+  double fiducial_mask_mm = 0.0;
+  std::vector<af::ViewXrayReader> xray_readers;
   std::optional<registration::Registration> registration;
-  af::ForkAwareMutex mutex;  ///< of registration
+  af::ForkAwareMutex mutex;  ///< of registration and xray_readers
+
+  /// The problem at hand, also while a registration runs.
+  [[nodiscard]] std::shared_ptr<const registration::RegistrationProblem> problem() const {
+    const std::lock_guard lock(problem_mutex_);
+    return problem_;
+  }
+
+  /// From now on registers a problem; leaves all as it is where that cannot be registered.
+  void use(const std::shared_ptr<const registration::RegistrationProblem>& problem,
+           const registration::RegistrationOptions& method) {
+    registration::Registration made(problem, method, pool);
+    made.examine_ends(uncertainty, pool);
+    registration.emplace(std::move(made));
+    const std::lock_guard lock(problem_mutex_);
+    problem_ = problem;
+  }
 
   [[nodiscard]] std::optional<double> tre_mm(const af::RigidTransform& pose) const {
     if (!gold.has_value()) return std::nullopt;
@@ -144,7 +176,7 @@ struct RegistrationCase::Impl {
     found.inadmissible = result.inadmissible;
     found.drr_count = result.drr_count;
     for (std::size_t i = 0; i < record.view_values.size(); ++i)
-      found.views.push_back({problem->views[i].view.camera.name,
+      found.views.push_back({registration->problem->views[i].view.camera.name,
                              record.view_values[i].coarse,
                              record.view_values[i].fine});
     found.uncertainty = uncertainty_of(record.uncertainty);
@@ -156,8 +188,11 @@ struct RegistrationCase::Impl {
 
  private:
   [[nodiscard]] std::array<double, 6> parameters_of(const af::RigidTransform& pose) const {
-    return af::parameters_from_pose(problem->frame(), pose).deg_and_mm();
+    return af::parameters_from_pose(registration->problem->frame(), pose).deg_and_mm();
   }
+
+  mutable af::ForkAwareMutex problem_mutex_;
+  std::shared_ptr<const registration::RegistrationProblem> problem_;
 };
 
 RegistrationCase::RegistrationCase(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -186,12 +221,14 @@ RegistrationCase RegistrationCase::load(const std::filesystem::path& study_path,
     impl->frame = library::frame_of(study_case.frame());
     impl->gold = af::known_gold(study, study_case);
     impl->target_points = af::target_points(study_case.target_box_ct);
-    const registration::LoadedCase loaded =
+    registration::LoadedCase loaded =
         registration::load_case(study, study_case, loading, af::Communicator::alone());
     impl->warnings.insert(impl->warnings.end(), loaded.warnings.begin(), loaded.warnings.end());
-    impl->problem = loaded.problem;
-    impl->registration.emplace(loaded.problem, method, pool);
-    impl->registration->examine_ends(uncertainty_options(options), pool);
+    impl->pool = pool;
+    impl->uncertainty = uncertainty_options(options);
+    impl->fiducial_mask_mm = loading.fiducial_mask_mm;
+    impl->xray_readers = std::move(loaded.xray_readers);
+    impl->use(loaded.problem, method);
     return RegistrationCase(std::move(impl));
   });
 }
@@ -200,14 +237,39 @@ const std::string& RegistrationCase::name() const {
   return impl_->name;
 }
 
+std::vector<std::string> RegistrationCase::set_xray(const std::string& camera,
+                                                    std::span<const float> xray) {
+  return set_xrays({{camera, xray}});
+}
+
+std::vector<std::string> RegistrationCase::set_xrays(
+    const std::map<std::string, std::span<const float>>& xrays) {
+  return library::translated([&] {
+    const std::lock_guard turn(impl_->mutex);
+    std::map<std::string, af::Image2d> images;
+    for (const auto& [camera, pixels] : xrays)
+      images.emplace(camera, whole_detector(impl_->study.rig.camera(camera), pixels));
+    std::vector<std::string> warnings;
+    const auto problem = registration::with_xrays(*impl_->registration->problem,
+                                                  impl_->xray_readers,
+                                                  impl_->fiducial_mask_mm,
+                                                  std::move(images),
+                                                  warnings);
+    impl_->use(problem, registration::RegistrationOptions(impl_->registration->method));
+    return warnings;
+  });
+}
+
 std::vector<CaseView> RegistrationCase::views() const {
+  const auto problem = impl_->problem();
   std::vector<CaseView> views;
-  for (const registration::RegistrationView& view : impl_->problem->views) {
+  for (const registration::RegistrationView& view : problem->views) {
     const af::RegionOfInterest& roi = view.view.roi;
     views.push_back({library::camera_of(view.view.camera),
                      {roi.column, roi.row, roi.width, roi.height},
                      view.xray.pixels,
-                     view.mask.pixels});
+                     view.mask.pixels,
+                     problem});
   }
   return views;
 }

@@ -70,7 +70,7 @@ struct ViewImages {
 ViewImages read_images(const StudyView& study_view,
                        const CameraGeometry& camera,
                        LoadedCase& loaded) {
-  ViewXray xray = read_view_xray(study_view, camera);
+  ViewXray xray = loaded.xray_readers.emplace_back(study_view, camera).read();
   loaded.input_notes["xray " + study_view.camera] = xray.note;
   for (std::string& warning : xray.warnings) loaded.warnings.push_back(std::move(warning));
   const auto note_hash = [&](const char* kind, const std::filesystem::path& path) {
@@ -81,6 +81,17 @@ ViewImages read_images(const StudyView& study_view,
   if (study_view.reading.flat) note_hash("flat", *study_view.reading.flat);
   if (study_view.reading.dark) note_hash("dark", *study_view.reading.dark);
   return {std::move(xray.attenuation), std::move(xray.mask)};
+}
+
+/// `fiducial_mask_px`: CaseLoadOptions::fiducial_mask_mm on the detector.
+void set_images(ViewImages images,
+                const StudyView& study_view,
+                double fiducial_mask_px,
+                RegistrationView& view) {
+  view.xray = std::move(images.xray);
+  view.mask = std::move(images.mask);
+  view.mask_without_markers =
+      mask_fiducials(view.mask, view.view.camera, study_view.fiducials_px, fiducial_mask_px);
 }
 
 /// Collective. The views without renderers; rank 0 reads the images and keeps hashes and notes.
@@ -100,13 +111,10 @@ std::vector<RegistrationView> read_views(const Study& study,
         on_root(communicator, [&] { return read_images(study_view, camera, loaded); })
             .share()
             .take();
-    view.xray = std::move(images.xray);
-    view.mask = std::move(images.mask);
-    view.mask_without_markers =
-        mask_fiducials(view.mask,
-                       camera,
-                       study_view.fiducials_px,
-                       fiducial_mask_mm * camera.pixels_per_mm(study.rig.isocenter_point));
+    set_images(std::move(images),
+               study_view,
+               fiducial_mask_mm * camera.pixels_per_mm(study.rig.isocenter_point),
+               view);
     views.push_back(std::move(view));
   }
   return views;
@@ -411,6 +419,33 @@ LoadedCase load_case(const Study& study,
   }
   loaded.problem = std::move(problem);
   return loaded;
+}
+
+std::shared_ptr<const RegistrationProblem> with_xrays(const RegistrationProblem& problem,
+                                                      std::span<ViewXrayReader> readers,
+                                                      double fiducial_mask_mm,
+                                                      std::map<std::string, Image2d> xrays,
+                                                      std::vector<std::string>& warnings) {
+  auto changed = std::make_shared<RegistrationProblem>(problem);
+  for (auto& [name, values] : xrays) {
+    std::size_t i = 0;
+    while (i < readers.size() && readers[i].view().camera != name) ++i;
+    if (i == readers.size())
+      throw InputError(
+          "camera",
+          "'" + name + "'",
+          "must be one of " + joined(problem.views, ", ", [](const RegistrationView& view) {
+            return view.view.camera.name;
+          }));
+    ViewXray xray = readers[i].prepared(std::move(values));
+    for (std::string& warning : xray.warnings) warnings.push_back(std::move(warning));
+    RegistrationView& view = changed->views[i];
+    set_images({std::move(xray.attenuation), std::move(xray.mask)},
+               readers[i].view(),
+               fiducial_mask_mm * view.view.camera.pixels_per_mm(problem.isocenter_point),
+               view);
+  }
+  return changed;
 }
 
 }  // namespace af::registration

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include "ranks/input_identity.h"
 #include "register/problem/registration_problem.h"
 #include "study/study_file.h"
+#include "study/xray_reader.h"
 
 namespace af::registration {
 
@@ -60,6 +62,7 @@ struct LoadedCase {
   InputIdentities inputs;                          ///< "ct", "field A", "xray A", ...
   std::map<std::string, std::string> input_notes;  ///< how each was read: "xray A", ...; rank 0
   std::vector<std::string> warnings;
+  std::vector<ViewXrayReader> xray_readers;  ///< of the views, in their order; rank 0
 };
 
 /// Collective. Everything a registration of one case needs, with the same content on every rank:
@@ -76,5 +79,14 @@ LoadedCase load_case(const Study& study,
                      const StudyCase& study_case,
                      const CaseLoadOptions& options,
                      const Communicator& communicator);
+
+/// The problem with other X-rays, by camera, each prepared as the study's (`readers`: of the loaded
+/// case; `fiducial_mask_mm`: of its options); all else is shared. What is odd about them goes to
+/// `warnings`. InputError for a camera of no view, and as load_case() for X-rays.
+std::shared_ptr<const RegistrationProblem> with_xrays(const RegistrationProblem& problem,
+                                                      std::span<ViewXrayReader> readers,
+                                                      double fiducial_mask_mm,
+                                                      std::map<std::string, Image2d> xrays,
+                                                      std::vector<std::string>& warnings);
 
 }  // namespace af::registration

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "base/error.h"
 #include "base/number_text.h"
@@ -208,10 +209,10 @@ void check_values(const Image2d& image, const StudyView& view) {
         "intensities must not be negative (xray_domain = \"attenuation\"?)",
         file);
   }
-  const auto [low, high] = std::minmax_element(image.pixels.begin(), image.pixels.end());
-  if (*low == *high)
+  const float first = image.pixels.front();
+  if (std::ranges::all_of(image.pixels, [&](float value) { return value == first; }))
     throw InputError(
-        "pixels", "all " + std::to_string(*low), "a constant image shows nothing", file);
+        "pixels", "all " + std::to_string(first), "a constant image shows nothing", file);
 }
 
 /// Takes out of a mask what another one hides; empty ones hide nothing.
@@ -225,14 +226,20 @@ void hide(Image2d& mask, const Image2d& shown) {
 }
 
 /// The flat or dark image of a view, turned as its X-ray: by the same full scale, which a flat
-/// field of inverted values, all small, does not show. `mask` loses its padding.
+/// field of inverted values, all small, does not show. `mask` loses its padding. `kept`: the file,
+/// which is read if it is not yet.
 Image2d load_companion(const std::filesystem::path& path,
                        const StudyView& view,
                        const CameraGeometry& camera,
                        std::optional<double> sum_of_xray,
+                       std::optional<LoadedImage>& kept,
                        Image2d& mask) {
-  LoadedImage loaded = load(path, std::nullopt);
-  check_size(loaded.image, path.string(), camera);
+  if (!kept.has_value()) {
+    LoadedImage read = load(path, std::nullopt);
+    check_size(read.image, path.string(), camera);
+    kept = std::move(read);
+  }
+  LoadedImage loaded = *kept;
   hide(mask, loaded.data);
   if (!is_turned(loaded, view)) return std::move(loaded.image);
   const double sum =
@@ -256,10 +263,17 @@ bool has_corrections(const StudyView& view) {
          (reading.flat || reading.dark || reading.dark_level != 0.0);
 }
 
+/// Files beside a view's X-ray that were read.
+struct ReadCompanions {
+  std::optional<LoadedImage> flat;
+  std::optional<LoadedImage> dark;
+};
+
 /// Dark and flat fields of a view, where it has them; `mask` loses pixels without a beam.
 void correct_by_flat(const StudyView& view,
                      const CameraGeometry& camera,
                      std::optional<double> sum_of_xray,
+                     ReadCompanions& read,
                      Image2d& image,
                      Image2d& mask,
                      Note& note) {
@@ -267,7 +281,7 @@ void correct_by_flat(const StudyView& view,
   Image2d dark;
   if (reading.dark) {
     dark = naming_study_line(view.places, "dark", [&] {
-      return load_companion(*reading.dark, view, camera, sum_of_xray, mask);
+      return load_companion(*reading.dark, view, camera, sum_of_xray, read.dark, mask);
     });
     note.add("dark image subtracted");
   } else if (reading.dark_level != 0.0) {
@@ -280,7 +294,7 @@ void correct_by_flat(const StudyView& view,
     return;
   }
   const Image2d flat = naming_study_line(view.places, "flat", [&] {
-    return load_companion(*reading.flat, view, camera, sum_of_xray, mask);
+    return load_companion(*reading.flat, view, camera, sum_of_xray, read.flat, mask);
   });
   std::size_t dead = 0;
   for (std::size_t i = 0; i < flat.pixels.size(); ++i)
@@ -394,20 +408,20 @@ XrayBorders borders_of(const Image2d& image, XrayDomain domain) {
 }
 
 /// Looking for borders takes a while on large pictures.
-bool needs_borders(const StudyView& view, const Image2d& image, const Image2d& data) {
+bool needs_borders(const StudyView& view, Background background) {
   const Background unexpected =
       view.xray_domain == XrayDomain::Intensity ? Background::Dark : Background::Bright;
   return view.reading.masks_borders || view.reading.air == AirSource::CollimatedBorders ||
-         background_of(image, data) == unexpected;
+         background == unexpected;
 }
 
-void note_background(const Image2d& image,
+void note_background(Background found,
+                     const Image2d& image,
                      const StudyView& view,
                      const XrayBorders& borders,
                      const Image2d& field,
                      Note& note,
                      std::vector<std::string>& warnings) {
-  const Background found = background_of(image, field);
   if (found == Background::Undecided) return;
   const bool is_bright = found == Background::Bright;
   const bool is_intensity = view.xray_domain == XrayDomain::Intensity;
@@ -503,12 +517,12 @@ void check_padding(const LoadedImage& loaded, const StudyView& view, Note& note)
 
 /// The X-ray's values, rising with what `xray_domain` says, and what was done for that;
 /// `inversion` is what they were subtracted from.
-LoadedImage load_oriented(const StudyView& view,
-                          const CameraGeometry& camera,
-                          std::optional<double>& inversion,
-                          Note& note,
-                          std::vector<std::string>& warnings) {
-  LoadedImage loaded = load(view.xray, view.reading.frame);
+LoadedImage oriented(LoadedImage loaded,
+                     const StudyView& view,
+                     const CameraGeometry& camera,
+                     std::optional<double>& inversion,
+                     Note& note,
+                     std::vector<std::string>& warnings) {
   check_size(loaded.image, view.xray.string(), camera);
   check_spacing(loaded, view, camera, warnings);
   if (!loaded.note.empty()) note.add(loaded.note);
@@ -530,21 +544,47 @@ LoadedImage load_oriented(const StudyView& view,
 
 }  // namespace
 
-ViewXray read_view_xray(const StudyView& view, const CameraGeometry& camera) {
+/// What was read or computed once for all X-rays of the view.
+struct ViewXrayReader::Kept {
+  std::optional<Image2d> mask;
+  ReadCompanions companions;
+  std::optional<XrayUndistortion> undistortion;
+};
+
+ViewXrayReader::ViewXrayReader(StudyView view, CameraGeometry camera)
+    : view_(std::move(view)), camera_(std::move(camera)), kept_(std::make_shared<Kept>()) {}
+
+ViewXray ViewXrayReader::read() {
+  return prepared(view_, [&] { return load(view_.xray, view_.reading.frame); });
+}
+
+ViewXray ViewXrayReader::prepared(Image2d values) {
+  StudyView given = view_;
+  given.xray = "X-ray of '" + camera_.name + "'";
+  given.places.erase("xray");
+  return prepared(given, [&] {
+    check_is_finite(values, given.xray);
+    return LoadedImage{std::move(values), std::nullopt, std::nullopt, Image2d(), ""};
+  });
+}
+
+template <typename Load>
+ViewXray ViewXrayReader::prepared(const StudyView& view, const Load& load_xray) {
   ViewXray xray;
   Note note;
-  if (view.mask)
-    xray.mask =
-        naming_study_line(view.places, "mask", [&] { return read_mask_file(view, camera); });
+  if (view.mask && !kept_->mask)
+    kept_->mask =
+        naming_study_line(view.places, "mask", [&] { return read_mask_file(view, camera_); });
+  if (kept_->mask) xray.mask = *kept_->mask;
   Image2d& image = xray.attenuation;
   XrayBorders borders;
-  std::optional<XrayUndistortion> undistortion;
-  if (!camera.distortion.is_none()) undistortion.emplace(camera);
+  std::optional<XrayUndistortion>& undistortion = kept_->undistortion;
+  if (!camera_.distortion.is_none() && !undistortion) undistortion.emplace(camera_);
   Image2d undistorted;
   std::optional<double> inversion;
   Image2d field;  // 0: no data, or a border that mask = "auto" hides
   naming_study_line(view.places, "xray", [&] {
-    LoadedImage loaded = load_oriented(view, camera, inversion, note, xray.warnings);
+    LoadedImage loaded = oriented(load_xray(), view, camera_, inversion, note, xray.warnings);
     image = std::move(loaded.image);
     check_values(image, view);
     hide(xray.mask, loaded.data);
@@ -552,13 +592,17 @@ ViewXray read_view_xray(const StudyView& view, const CameraGeometry& camera) {
     const Image2d& shown = undistortion ? undistorted : image;
     if (!loaded.data.pixels.empty())
       field = undistortion ? undistortion->mask(loaded.data) : std::move(loaded.data);
-    if (needs_borders(view, shown, field)) borders = borders_of(shown, view.xray_domain);
-    if (view.reading.masks_borders) hide(field, borders.mask);
-    note_background(shown, view, borders, field, note, xray.warnings);
+    Background background = background_of(shown, field);
+    if (needs_borders(view, background)) borders = borders_of(shown, view.xray_domain);
+    if (view.reading.masks_borders) {
+      hide(field, borders.mask);
+      background = background_of(shown, field);
+    }
+    note_background(background, shown, view, borders, field, note, xray.warnings);
   });
   // Flat and dark fields are of the detector's own pixels.
   if (view.xray_domain == XrayDomain::Intensity)
-    correct_by_flat(view, camera, inversion, image, xray.mask, note);
+    correct_by_flat(view, camera_, inversion, kept_->companions, image, xray.mask, note);
   if (undistortion)
     naming_study_line(view.places, "xray", [&] {
       image = has_corrections(view) ? undistortion->image(image) : std::move(undistorted);
@@ -572,6 +616,10 @@ ViewXray read_view_xray(const StudyView& view, const CameraGeometry& camera) {
   if (note.text().empty()) note.add("attenuation as the file has it");
   xray.note = note.text();
   return xray;
+}
+
+ViewXray read_view_xray(const StudyView& view, const CameraGeometry& camera) {
+  return ViewXrayReader(view, camera).read();
 }
 
 }  // namespace af

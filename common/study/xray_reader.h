@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,30 @@ struct ViewXray {
   Image2d mask;         ///< the camera's size, non-zero = used; empty: every pixel
   std::string note;     ///< what was done to the values: frame, inversion, air level, mask
   std::vector<std::string> warnings;
+};
+
+/// The X-rays of one view, each prepared as the view's XrayReading says: that of the study, and
+/// others of the same camera. Mask, flat and dark fields are read with the first. For one thread at
+/// a time; copies share what was read.
+class ViewXrayReader {
+ public:
+  ViewXrayReader(StudyView view, CameraGeometry camera);
+
+  [[nodiscard]] const StudyView& view() const { return view_; }
+  /// As read_view_xray().
+  [[nodiscard]] ViewXray read();
+  /// As if the view's file were one without a header and held these values. Errors as of read().
+  /// \test XrayReader.PreparesValuesAsTheFileThatHoldsThem
+  [[nodiscard]] ViewXray prepared(Image2d values);
+
+ private:
+  template <typename Load>
+  ViewXray prepared(const StudyView& view, const Load& load_xray);
+
+  struct Kept;
+  StudyView view_;
+  CameraGeometry camera_;
+  std::shared_ptr<Kept> kept_;
 };
 
 /// Reads a view's X-ray in the attenuation domain, as its XrayReading says. Intensities are turned

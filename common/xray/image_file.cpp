@@ -92,18 +92,6 @@ void check_is_image(const Image2d& image) {
         "an image to write has pixels for its size");
 }
 
-void check_is_finite(const Image2d& image, const fs::path& path) {
-  const auto found = std::find_if_not(
-      image.pixels.begin(), image.pixels.end(), [](float value) { return std::isfinite(value); });
-  if (found == image.pixels.end()) return;
-  const auto at = static_cast<int>(found - image.pixels.begin());
-  throw InputError(
-      "pixel (" + std::to_string(at % image.width) + ", " + std::to_string(at / image.width) + ")",
-      std::to_string(*found),
-      "must be finite",
-      path.string());
-}
-
 Image2d read_dicom_image(const fs::path& path) {
   const DicomPixelLayout layout = dicom_pixel_layout(DicomElements::read(path));
   const DicomPixels pixels = read_dicom_pixels(layout);
@@ -126,6 +114,18 @@ std::size_t extent(int value) {
 }
 
 }  // namespace
+
+void check_is_finite(const Image2d& image, const fs::path& path) {
+  const auto found = std::find_if_not(
+      image.pixels.begin(), image.pixels.end(), [](float value) { return std::isfinite(value); });
+  if (found == image.pixels.end()) return;
+  const auto at = static_cast<int>(found - image.pixels.begin());
+  throw InputError(
+      "pixel (" + std::to_string(at % image.width) + ", " + std::to_string(at / image.width) + ")",
+      std::to_string(*found),
+      "must be finite",
+      path.string());
+}
 
 Image2d read_image(const fs::path& path) {
   return read_image_with_spacing(path).image;

@@ -21,6 +21,9 @@ namespace af {
 /// InputError when it is not 2-D, has several channels or pixels that are not finite.
 Image2d read_image(const std::filesystem::path& path);
 
+/// InputError that names the first pixel that is not finite, and `path`.
+void check_is_finite(const Image2d& image, const std::filesystem::path& path);
+
 /// An image with what its file says of its pixels.
 struct ImageWithSpacing {
   Image2d image;

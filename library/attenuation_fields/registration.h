@@ -49,12 +49,13 @@ struct ViewAgreement {
   double fine = 0.0;
 };
 
-/// An X-ray of a case, whole detector, row by row. Spans live as long as the case.
+/// An X-ray of a case, whole detector, row by row. The spans live as long as their `owner`.
 struct CaseView {
   Camera camera;
   std::array<int, 4> roi_px{};  ///< region of interest: column, row, width, height
   std::span<const float> xray;  ///< in the attenuation domain: bright is attenuated
   std::span<const float> mask;  ///< non-zero is used; empty: every pixel
+  std::shared_ptr<const void> owner;
 };
 
 /// What a registration says of its own error; NaN where it cannot be said.
@@ -91,7 +92,7 @@ struct Registration {
 };
 
 /// A case of a study with all that its registrations need: X-rays, fields or CT. One call at a
-/// time; calls from other threads wait.
+/// time; calls from other threads wait. Copies are the same case.
 class ATTENUATION_FIELDS_API RegistrationCase {
  public:
   /// `case_name`: empty picks the only one. InputError, FileError.
@@ -104,7 +105,17 @@ class ATTENUATION_FIELDS_API RegistrationCase {
                                const RegistrationOptions& options,
                                const Beam& beam);
 
+  /// Registers other X-rays from now on, of one camera or of several; fields and CT stay as they
+  /// are. An X-ray holds the values of the whole detector, row by row, in the domain that the
+  /// study's `xray_domain` says. They are checked and prepared as if the study's file had held them
+  /// (and no header, such as DICOM's): the study's air level, flat and dark fields, distortion,
+  /// mask and fiducials apply, and registrations have the bits of a case that was loaded with them.
+  /// Returns what is odd about them. InputError, which leaves the case as it was.
+  std::vector<std::string> set_xray(const std::string& camera, std::span<const float> xray);
+  std::vector<std::string> set_xrays(const std::map<std::string, std::span<const float>>& xrays);
+
   [[nodiscard]] const std::string& name() const;
+  /// With the X-rays that are in force.
   [[nodiscard]] std::vector<CaseView> views() const;
   /// Nominal pose, about the centre of the region of interest.
   [[nodiscard]] const PoseFrame& frame() const;

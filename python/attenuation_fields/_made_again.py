@@ -22,7 +22,12 @@ def ray_caster(arguments: Dict[str, Any]) -> RayCaster:
 
 
 def registration_case(arguments: Dict[str, Any]) -> RegistrationCase:
-    return RegistrationCase.load(**arguments)
+    options = dict(arguments)
+    xrays = options.pop("xrays", {})
+    case = RegistrationCase.load(**options)
+    if xrays:
+        case.set_xrays(xrays)
+    return case
 
 
 def table(arguments: Dict[str, Any]) -> Table:

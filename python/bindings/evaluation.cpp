@@ -58,6 +58,7 @@ void bind_table(py::module_& module) {
       module, "Table", "A CSV file with a header line: registrations.csv, image-quality.csv.");
   table.def_static("read", keeping_arguments(&table_of, {"path"}), "path"_a);
   def_made_again(table, "table");
+  def_copies(table);
   table.def_property_readonly("columns",
                               [](const PythonTable& self) { return cells_of(self.columns()); });
   table.def("__len__", &Table::row_count);

@@ -108,7 +108,6 @@ void def_made_again(py::class_<MadeBy<Made>, Bases...>& owner, const char* maker
     const py::object make = py::module_::import("attenuation_fields._made_again").attr(maker);
     return py::make_tuple(make, py::make_tuple(self.arguments, (self.*facts)()...));
   });
-  def_copies(owner);
 }
 
 }  // namespace attenuation_fields::python

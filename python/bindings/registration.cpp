@@ -101,13 +101,12 @@ void bind_result(py::module_& module) {
              &Registration::seconds);
 }
 
-/// The pixels themselves, read-only; the array keeps the case.
-py::array_t<float> image_of(const RegistrationCase& owner,
-                            const Camera& camera,
-                            std::span<const float> pixels) {
-  const py::capsule keeper(new RegistrationCase(owner),
-                           [](void* pointer) { delete static_cast<RegistrationCase*>(pointer); });
-  py::array_t<float> image({camera.size_px[1], camera.size_px[0]}, pixels.data(), keeper);
+/// The pixels themselves, read-only; the array keeps their owner.
+py::array_t<float> image_of(const CaseView& view, std::span<const float> pixels) {
+  using Owner = std::shared_ptr<const void>;
+  const py::capsule keeper(new Owner(view.owner),
+                           [](void* pointer) { delete static_cast<Owner*>(pointer); });
+  py::array_t<float> image({view.camera.size_px[1], view.camera.size_px[0]}, pixels.data(), keeper);
   image.attr("flags").attr("writeable") = false;
   return image;
 }
@@ -124,11 +123,35 @@ std::vector<PythonView> views_of(const PythonCase& owner) {
   std::vector<PythonView> views;
   for (const CaseView& view : owner.views()) {
     py::object mask = py::none();
-    if (!view.mask.empty()) mask = image_of(owner, view.camera, view.mask);
-    views.push_back(
-        {view.camera, view.roi_px, image_of(owner, view.camera, view.xray), std::move(mask)});
+    if (!view.mask.empty()) mask = image_of(view, view.mask);
+    views.push_back({view.camera, view.roi_px, image_of(view, view.xray), std::move(mask)});
   }
   return views;
+}
+
+/// Rows and columns of a camera's X-ray; any for a camera that the case does not have.
+std::vector<py::ssize_t> shape_of(const PythonCase& owner, const std::string& camera) {
+  for (const CaseView& view : owner.views())
+    if (view.camera.name == camera) return {view.camera.size_px[1], view.camera.size_px[0]};
+  return {-1, -1};
+}
+
+void set_xrays(PythonCase& self, const std::map<std::string, Numbers>& xrays) {
+  std::map<std::string, py::array_t<float, py::array::c_style | py::array::forcecast>> arrays;
+  std::map<std::string, std::span<const float>> pixels;
+  for (const auto& [camera, xray] : xrays) {
+    const std::string name = "xray of '" + camera + "'";
+    const auto& array =
+        arrays.emplace(camera, converted<float>(xray, name.c_str(), shape_of(self, camera)))
+            .first->second;
+    pixels[camera] = {array.data(), static_cast<std::size_t>(array.size())};
+  }
+  const std::vector<std::string> warnings = without_lock([&] { return self.set_xrays(pixels); });
+  // For pickle; the caller may change the array.
+  if (!self.arguments.contains("xrays")) self.arguments["xrays"] = py::dict();
+  const py::dict kept = self.arguments["xrays"];
+  for (const auto& [camera, array] : arrays) kept[py::str(camera)] = array.attr("copy")();
+  warn_of(warnings);
 }
 
 RegistrationCase load(const std::filesystem::path& study,
@@ -240,9 +263,25 @@ void bind_case(py::module_& module) {
                                "scatter_to_primary"_a = Beam{}.scatter_to_primary,
                                "Options are those of af-register.");
   def_made_again(registration_case, "registration_case");
+  registration_case.def(
+      "set_xrays",
+      &set_xrays,
+      "xrays"_a,
+      "Registers other X-rays from now on: arrays (h, w) by camera, in the domain that the study's "
+      "xray_domain says. They are checked and prepared as if the study's file had held them, and "
+      "registrations have the bits of a case that was loaded with them; fields and CT are not "
+      "read again. An InputError leaves the case as it was.");
+  registration_case.def(
+      "set_xray",
+      [](PythonCase& self, const std::string& camera, const Numbers& xray) {
+        set_xrays(self, {{camera, xray}});
+      },
+      "camera"_a,
+      "xray"_a,
+      "set_xrays() of one camera.");
   registration_case.def_property_readonly("name", &RegistrationCase::name);
   registration_case.def_property_readonly(
-      "views", &views_of, "The case's X-rays, with their cameras and regions of interest.");
+      "views", &views_of, "The X-rays in force, with their cameras and regions of interest.");
   registration_case.def_property_readonly("frame",
                                           [](const PythonCase& self) { return self.frame(); });
   registration_case.def_property_readonly(

@@ -229,6 +229,7 @@ void bind_field(py::module_& module) {
   field.def_property_readonly("payload_sha256", &Field::payload_sha256);
   field.def_property_readonly("water_mu_per_mm", &Field::water_mu_per_mm);
   def_made_again(field, "field", &Field::payload_sha256);
+  def_copies(field);
 }
 
 RayCaster ray_caster_of(const Ct& ct,
@@ -282,6 +283,7 @@ void bind_ray_caster(py::module_& module) {
              "scatter_to_primary"_a = Beam{}.scatter_to_primary,
              "frame: what poses are relative to; without one the CT's centre at isocenter_point.");
   def_made_again(caster, "ray_caster");
+  def_copies(caster);
 }
 
 }  // namespace

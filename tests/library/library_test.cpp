@@ -10,6 +10,8 @@
 #include <iterator>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <random>
+#include <span>
 #include <string>
 #include <thread>
 #include <vector>
@@ -434,6 +436,90 @@ TEST(LibraryRegistration, LeavesOutTheUncertaintyAndNothingElse) {
   EXPECT_TRUE(std::isnan(without.uncertainty.covariance[2][4]));
   EXPECT_EQ(without.pose.room_from_ct, with.pose.room_from_ct);
   EXPECT_EQ(without.verdict, with.verdict);
+}
+
+RegistrationOptions options_with_fields(const std::string& preset) {
+  RegistrationOptions options;
+  options.preset = preset;
+  options.fields = {{"AP", study_file("AP.af.h5")}, {"LAT", study_file("LAT.af.h5")}};
+  return options;
+}
+
+/// A folder with the study, but with the first X-ray's values changed.
+class StudyOfAnotherXray {
+ public:
+  explicit StudyOfAnotherXray(std::size_t pixels)
+      : folder_(fs::temp_directory_path() /
+                ("library_test_" + std::to_string(std::random_device()()))),
+        xray_(last_floats(study_file("AP.mha"), pixels)) {
+    fs::create_directories(folder_);
+    for (const char* name : {"study.toml", "rig.toml", "ct.nii.gz", "AP.mha", "LAT.mha"})
+      fs::copy_file(study_file(name), folder_ / name);
+    for (std::size_t i = 0; i < xray_.size(); ++i)
+      xray_[i] = 0.9f * xray_[i] + 0.01f * static_cast<float>(i % 7);
+    const std::size_t bytes = pixels * sizeof(float);
+    std::fstream file(folder_ / "AP.mha", std::ios::binary | std::ios::in | std::ios::out);
+    file.seekp(-static_cast<std::streamoff>(bytes), std::ios::end);
+    file.write(reinterpret_cast<const char*>(xray_.data()), static_cast<std::streamsize>(bytes));
+  }
+  ~StudyOfAnotherXray() { fs::remove_all(folder_); }
+  StudyOfAnotherXray(const StudyOfAnotherXray&) = delete;
+  StudyOfAnotherXray& operator=(const StudyOfAnotherXray&) = delete;
+
+  [[nodiscard]] fs::path study() const { return folder_ / "study.toml"; }
+  [[nodiscard]] const std::vector<float>& xray() const { return xray_; }
+
+ private:
+  fs::path folder_;
+  std::vector<float> xray_;
+};
+
+void expect_same(const Registration& found, const Registration& expected) {
+  EXPECT_EQ(found.pose.room_from_ct, expected.pose.room_from_ct);
+  EXPECT_EQ(found.similarity, expected.similarity);
+  EXPECT_EQ(found.verdict, expected.verdict);
+  EXPECT_EQ(found.reason, expected.reason);
+  EXPECT_EQ(found.evaluations, expected.evaluations);
+  EXPECT_EQ(found.drr_count, expected.drr_count);
+  EXPECT_EQ(found.uncertainty.covariance, expected.uncertainty.covariance);
+  EXPECT_EQ(found.uncertainty.confidence, expected.uncertainty.confidence);
+  ASSERT_EQ(found.views.size(), expected.views.size());
+  for (std::size_t i = 0; i < found.views.size(); ++i) {
+    EXPECT_EQ(found.views[i].coarse, expected.views[i].coarse);
+    EXPECT_EQ(found.views[i].fine, expected.views[i].fine);
+  }
+}
+
+TEST(LibraryRegistration, AnExchangedXrayIsRegisteredAsOneThatWasLoaded) {
+  for (const char* preset : {"fast", "robust"}) {
+    const RegistrationOptions options = options_with_fields(preset);
+    RegistrationCase exchanged = RegistrationCase::load(study_file("study.toml"), "", options);
+    const Pose start = exchanged.frame().pose({-1.0, 0.5, 2.5}, {0.5, 1.0, 4.0});
+    const CaseView before = exchanged.views()[0];
+    const std::vector<float> own(before.xray.begin(), before.xray.end());
+    const Registration first = exchanged.run(start);
+    const StudyOfAnotherXray other(own.size());
+    const RegistrationCase fresh = RegistrationCase::load(other.study(), "", options);
+    const Registration expected = fresh.run(start);
+    EXPECT_NE(expected.pose.room_from_ct, first.pose.room_from_ct);
+
+    EXPECT_THAT(exchanged.set_xray("AP", other.xray()), testing::IsEmpty());
+    expect_same(exchanged.run(start), expected);
+    EXPECT_EQ(exchanged.similarity(start), fresh.similarity(start));
+    EXPECT_TRUE(std::ranges::equal(exchanged.views()[0].xray, other.xray()));
+    EXPECT_TRUE(std::ranges::equal(before.xray, own)) << "of its owner";
+
+    EXPECT_THAT(message_of<InputError>([&] { exchanged.set_xray("PA", own); }), HasSubstr("LAT"));
+    EXPECT_THAT(
+        message_of<InputError>([&] { exchanged.set_xray("AP", std::span(own).subspan(1)); }),
+        HasSubstr("the camera's pixels"));
+    EXPECT_THAT(message_of<InputError>(
+                    [&] { exchanged.set_xray("AP", std::vector<float>(own.size(), 1.0f)); }),
+                HasSubstr("constant"));
+    expect_same(exchanged.run(start), expected);
+    exchanged.set_xrays({{"AP", own}, {"LAT", exchanged.views()[1].xray}});
+    expect_same(exchanged.run(start), first);
+  }
 }
 
 TEST(LibraryRegistration, StartsAtTheNominalPoseWithoutLandmarks) {

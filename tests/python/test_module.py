@@ -609,6 +609,31 @@ class RegistrationTest(unittest.TestCase):
         self.assertTrue(np.isnan(found.uncertainty.covariance).all())
         self.assertTrue(np.isnan(found.uncertainty.confidence))
 
+    def test_other_xrays_are_registered_and_pickled(self):
+        case = af.RegistrationCase.load(STUDY / "study.toml", preset="fast", fields=self.fields)
+        start = case.frame.pose((-1, 0.5, 2.5), (0.5, 1, 4))
+        own = case.views[0].xray
+        first = case.run(start)
+        other = 0.9 * own.astype(np.float64) + 0.01 * (np.arange(own.size) % 7).reshape(own.shape)
+        case.set_xray("AP", other)
+        found = case.run(start)
+        self.assertNotEqual(found.pose.tobytes(), first.pose.tobytes())
+        self.assertEqual(case.views[0].xray.tobytes(), other.astype(np.float32).tobytes())
+        sent = pickle.loads(pickle.dumps(case))
+        copied = copy.copy(case)
+        case.set_xrays({"AP": own, "LAT": case.views[1].xray})
+        self.assertEqual(case.run(start).pose.tobytes(), first.pose.tobytes())
+        for again in (sent, copied):
+            self.assertEqual(again.run(start).pose.tobytes(), found.pose.tobytes())
+        for wrong, message in (
+            (own[:-1], "AP"), (own.T[:, :-1], "shape"), (np.full(own.shape, np.nan), "finite"),
+        ):
+            with self.assertRaisesRegex(af.InputError, message):
+                case.set_xray("AP", wrong)
+        with self.assertRaisesRegex(af.InputError, "LAT"):
+            case.set_xray("PA", own)
+        self.assertEqual(case.run(start).pose.tobytes(), first.pose.tobytes())
+
     def test_wrong_options_are_refused_as_by_the_program(self):
         with self.assertRaisesRegex(af.InputError, "robust"):
             af.RegistrationCase.load(STUDY / "study.toml", preset="hasty")

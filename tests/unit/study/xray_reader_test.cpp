@@ -784,5 +784,52 @@ TEST(XrayReader, MasksAreThoseOfTheStoredXray) {
   EXPECT_EQ(found.at(33, 177), 1.0f) << "not where it stands in the file";
 }
 
+TEST(XrayReader, PreparesValuesAsTheFileThatHoldsThem) {
+  const ScratchFolder folder;
+  const auto counts = [](std::uint64_t seed) {
+    HashRandom random(seed, 0);
+    Image2d image(256, 200);
+    for (float& value : image.pixels)
+      value = static_cast<float>(std::floor(random.uniform(500.0, 3500.0)));
+    return image;
+  };
+  Image2d mask = counts(1);
+  mask.pixels[7] = 0.0f;
+  write_image(mask, folder / "mask.mha", 0.4, 0.4);
+  Image2d beam(256, 200);
+  std::fill(beam.pixels.begin(), beam.pixels.end(), 4000.0f);
+  write_image(beam, folder / "flat.mha", 0.4, 0.4);
+  const CameraGeometry camera = distorting_camera(kBarrel);
+  StudyView plain = distorted_view(folder, counts(2));
+  plain.xray_domain = XrayDomain::Intensity;
+  StudyView corrected = plain;
+  corrected.mask = folder / "mask.mha";
+  corrected.reading.flat = folder / "flat.mha";
+  corrected.reading.dark_level = 20.0;
+  StudyView inverted = plain;
+  inverted.reading.polarity = XrayPolarity::Inverted;
+  inverted.reading.masks_borders = true;
+  StudyView attenuation = plain;
+  attenuation.xray_domain = XrayDomain::Attenuation;
+  for (const StudyView& view : {plain, corrected, inverted, attenuation}) {
+    write_image(counts(2), view.xray, 0.4, 0.4);
+    ViewXrayReader reader(view, camera);
+    (void)reader.read();
+    const ViewXray found = reader.prepared(counts(3));
+    write_image(counts(3), view.xray, 0.4, 0.4);
+    const ViewXray expected = read_view_xray(view, camera);
+    EXPECT_EQ(found.attenuation.pixels, expected.attenuation.pixels);
+    EXPECT_EQ(found.mask.pixels, expected.mask.pixels);
+    EXPECT_EQ(found.note, expected.note);
+  }
+  ViewXrayReader reader(plain, camera);
+  Image2d broken = counts(2);
+  broken.at(3, 1) = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_THAT(test::message_of<InputError>([&] { (void)reader.prepared(broken); }),
+              AllOf(HasSubstr("X-ray of '"), HasSubstr("pixel (3, 1)"), HasSubstr("finite")));
+  EXPECT_THAT(test::message_of<InputError>([&] { (void)reader.prepared(Image2d(3, 3)); }),
+              HasSubstr("size = 3 x 3 px"));
+}
+
 }  // namespace
 }  // namespace af
