@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "register/register_options.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace af::registration {
@@ -37,15 +38,18 @@ void describe_start(Fields& field, RegisterOptions& options) {
 
 void RegisterOptions::describe(Fields& field) {
   field("study", study, "study.toml: rig, cases, X-rays")
+      .as("study,--study")
       .stands_for(PathRole::InputFile, ".toml")
       .required()
       .input();
   field("case", case_name, "Case of the study (may be left out when it has one)");
   field.part(fields);
-  field("renderer",
-        renderer,
-        "How DRRs are made: 'field' looks them up, 'raycast' casts rays through the CT")
-      .choice({"field", "raycast"});
+  field(
+      "renderer",
+      renderer,
+      "How DRRs are made: 'field' looks them up, 'raycast' casts rays through the CT; 'auto' casts "
+      "rays where neither the study nor --field names a field")
+      .choice({"auto", "field", "raycast"});
   field.part(method);
   field.at("seed").as("--seed");
   field.part(correction);
@@ -102,6 +106,16 @@ std::vector<std::string> problems(const RegisterOptions& options) {
     found.emplace_back(kCorrectsRayCasting);
   for (const std::string& text : field_problems(options)) found.push_back(text);
   return found;
+}
+
+std::string renderer_of(const RegisterOptions& options, const StudyCase& study_case) {
+  if (options.renderer != "auto") return options.renderer;
+  const bool has_field = !options.fields.texts.empty() ||
+                         std::ranges::any_of(study_case.views, [](const StudyView& view) {
+                           return view.field.has_value();
+                         });
+  const bool needs_field = options.skip_ct_check || options.correction.is_wanted;
+  return has_field || needs_field ? "field" : "raycast";
 }
 
 CaseLoadOptions case_load_options(const RegisterOptions& options,

@@ -21,7 +21,7 @@ struct RegisterOptions {
   std::filesystem::path study;
   std::string case_name;
   FieldPaths fields;
-  std::string renderer = "field";
+  std::string renderer = "auto";  ///< or "field" or "raycast"
   MethodOptions method;
   CorrectionOptions correction;
   UncertaintyOptions uncertainty;
@@ -45,6 +45,10 @@ struct RegisterOptions {
 
 /// All impossible values and combinations of options; empty when the options are sound.
 std::vector<std::string> problems(const RegisterOptions& options);
+
+/// The renderer of a case: "field" or "raycast" if that is asked for; else ray casting where no
+/// view has a field and nothing is asked for that needs one.
+std::string renderer_of(const RegisterOptions& options, const StudyCase& study_case);
 
 /// `coarsest_level` and `last_levels`: of the method.
 CaseLoadOptions case_load_options(const RegisterOptions& options,

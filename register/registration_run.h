@@ -24,7 +24,7 @@ std::vector<RigidTransform> start_poses(const RegisterOptions& options,
 
 /// Collective. Loads the case, registers it from every start and writes the output folder.
 /// NotFoundError, after writing the results, when no pose was found.
-void run_registration(const RegisterOptions& options,
+void run_registration(const RegisterOptions& typed,
                       const std::string& command_line,
                       const Communicator& world);
 

@@ -218,6 +218,22 @@ TEST_F(RegisterProgram, CorrectsEveryStartOfATableOnAnyRankCount) {
       EXPECT_EQ(shared.text(i, column), rows.text(i, column)) << column;
 }
 
+TEST_F(RegisterProgram, CastsRaysWhereNoViewHasAField) {
+  const std::string start = " --preset fast --start-rotation-deg -1,0.5,2.5 --no-pictures -o ";
+  const test::ProgramRun asked = run_register("--renderer raycast" + start + path("asked"));
+  ASSERT_EQ(asked.exit_code, 0) << asked.output;
+  EXPECT_EQ(asked.output.find("af-precompute"), std::string::npos) << asked.output;
+  const test::ProgramRun found = test::run_command(program("af-register") + " " +
+                                                   path("study.toml") + start + path("unasked"));
+  ASSERT_EQ(found.exit_code, 0) << found.output;
+  EXPECT_NE(found.output.find("renderer: raycast, as neither the study nor --field"),
+            std::string::npos)
+      << found.output;
+  EXPECT_EQ(result("unasked").at("renderer"), "raycast");
+  for (const char* key : {"room_from_ct", "similarity", "evaluations"})
+    EXPECT_EQ(result("unasked").at(key), result("asked").at(key)) << key;
+}
+
 TEST_F(RegisterProgram, RefusesACorrectionThatCannotBe) {
   const std::string wanted = fields() + " --correct -o " + path("x");
   expect_refused(run_register(wanted + " --skip-ct-check"), 3, "--skip-ct-check");
@@ -474,7 +490,9 @@ TEST_F(RegisterProgram, RefusesWhatDoesNotExist) {
   expect_refused(run_register(fields() + " --no-such-option" + out), 2, "no-such-option");
   expect_refused(run_register(fields()), 2, "--output");
   expect_refused(run_register(fields() + " --case nobody" + out), 3, "ellipsoids");
-  expect_refused(run_register(out), 3, "--field AP=");
+  expect_refused(run_register("--renderer field" + out), 3, "--field AP=");
+  expect_refused(run_register("--field AP=" + path("AP.af.h5") + out), 3, "--field LAT=");
+  expect_refused(run_register("--skip-ct-check" + out), 3, "--field AP=");
   expect_refused(run_register("--field X=a.h5" + out), 3, "AP, LAT");
   expect_refused(run_register("--field AP" + out), 3, "CAMERA=PATH");
   expect_refused(

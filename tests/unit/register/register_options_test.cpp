@@ -44,6 +44,29 @@ TEST(RegisterOptions, FieldsAreSplitAtTheFirstEqualsSign) {
   EXPECT_EQ(case_load_options(options).field_paths.at("A"), "x=y.h5");
 }
 
+TEST(RegisterOptions, RaysAreCastWhereNothingNamesOrNeedsAField) {
+  StudyCase study_case;
+  study_case.views.resize(2);
+  RegisterOptions options;
+  EXPECT_EQ(renderer_of(options, study_case), "raycast");
+  options.renderer = "field";
+  EXPECT_EQ(renderer_of(options, study_case), "field");
+  options.renderer = "auto";
+  options.correction.is_wanted = true;
+  EXPECT_EQ(renderer_of(options, study_case), "field");
+  options.correction.is_wanted = false;
+  options.skip_ct_check = true;
+  EXPECT_EQ(renderer_of(options, study_case), "field");
+  options.skip_ct_check = false;
+  options.fields.texts = {"A=a.h5"};
+  EXPECT_EQ(renderer_of(options, study_case), "field");
+  options.fields.texts.clear();
+  study_case.views[1].field = "b.h5";
+  EXPECT_EQ(renderer_of(options, study_case), "field");
+  options.renderer = "raycast";
+  EXPECT_EQ(renderer_of(options, study_case), "raycast");
+}
+
 TEST(RegisterOptions, InForceAreToml) {
   RegisterOptions options;
   options.study = "a\tb\n\x7f\"\\.toml";
