@@ -4,16 +4,9 @@ import io
 import math
 import zlib
 
-import matplotlib
-
-matplotlib.use("Agg")
-
-from matplotlib import pyplot  # noqa: E402
-from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator  # noqa: E402
-
-from .files import csv_text, write_file  # noqa: E402
-from .numbers import as_number  # noqa: E402
-from .runs import field_name, is_papers_setting, method_name  # noqa: E402
+from .files import csv_text, write_file
+from .numbers import as_number
+from .runs import field_name, is_papers_setting, method_name
 
 # Colours that people with any form of colour blindness tell apart (Okabe and Ito 2008).
 BLUE, VERMILION, GREEN, PURPLE, SKY, ORANGE = COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")
@@ -21,57 +14,67 @@ INK, QUIET, GRID = "#1F2933", "#5B6B7D", "#D8DEE6"
 LOWEST_MM, HIGHEST_MM = 0.01, 100.0
 MOST_DOTS = 4000
 
-matplotlib.rcParams.update({
+STYLE = {
     "svg.hashsalt": "af-report", "svg.fonttype": "none", "font.family": "DejaVu Sans", "font.size": 11,
     "axes.spines.top": False, "axes.spines.right": False, "axes.edgecolor": INK, "axes.labelcolor": INK,
     "axes.grid": True, "axes.axisbelow": True, "grid.color": GRID, "xtick.color": INK, "ytick.color": INK,
-    "axes.titlesize": 12, "text.color": INK, "legend.frameon": False, "text.parse_math": False,
-    "figure.constrained_layout.use": True})
+    "axes.titlesize": 12, "text.color": INK, "legend.frameon": False, "text.parse_math": False}
 
 
-def new_figure(title="", size=(6.4, 4.2), rows=1, columns=1):
-    figure, axes = pyplot.subplots(rows, columns, figsize=size, squeeze=False)
+def new_figure(title="", size=None, rows=1, columns=1):
+    """Without a size: one panel with margins for numbers such as 0.01, which saves the layout's time."""
+    # The import takes longer than most pages, so that only what draws pays for it.
+    import matplotlib
+    from matplotlib.figure import Figure
+    matplotlib.rcParams.update(STYLE)
+    figure = Figure(figsize=size or (6.4, 4.2), layout="constrained" if size else None)
+    axes = figure.subplots(rows, columns, squeeze=False)
+    if not size:
+        figure.subplots_adjust(left=0.106, bottom=0.115, right=0.978, top=0.917)
     if title:
         figure.suptitle(title, fontsize=12)
     return figure, axes.ravel()
 
 
-def settled(figure):
-    """The figure, laid out once for all its formats."""
-    figure.draw_without_rendering()
-    figure.set_layout_engine("none")
-    return figure
-
-
-def bytes_of(figure, **options):
+def svg_of(figure):
+    """The bytes, by one drawing; savefig() draws twice."""
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
     buffer = io.BytesIO()
-    figure.savefig(buffer, **options)
+    FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None, "Creator": None})
     return buffer.getvalue()
 
 
-def svg_of(figure):
-    content = bytes_of(settled(figure), format="svg", metadata={"Date": None, "Creator": None})
-    pyplot.close(figure)
-    return content
+def png_of(figure):
+    """The bytes, with 200 pixels per inch."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    buffer = io.BytesIO()
+    figure.dpi = 200
+    FigureCanvasAgg(figure).print_png(buffer, metadata={"Software": None}, pil_kwargs={"compress_level": 1})
+    return buffer.getvalue()
 
 
 def save(drawn, path):
     """PATH.svg, PATH.png at twice the size and, where there are rows, PATH.csv."""
     figure, columns, rows = drawn
-    png = bytes_of(settled(figure), format="png", dpi=200, metadata={"Software": None})
-    write_file(f"{path}.svg", bytes_of(figure, format="svg", metadata={"Date": None, "Creator": None}))
-    write_file(f"{path}.png", png)
-    pyplot.close(figure)
+    write_file(f"{path}.png", png_of(figure))
+    # The first drawing has laid the figure out.
+    figure.set_layout_engine("none")
+    write_file(f"{path}.svg", svg_of(figure))
     if columns:
         write_file(f"{path}.csv", csv_text(columns, rows))
 
 
+def ticks_at(axis, values):
+    """These ticks alone, with their numbers as they stand."""
+    from matplotlib.ticker import FixedLocator
+    axis.set_major_locator(FixedLocator(values))
+    axis.set_ticks([], minor=True)
+    axis.set_major_formatter("{x:g}")
+
+
 def millimetres(axis, highest=HIGHEST_MM):
     """A logarithmic axis of errors that begins at 0.01 mm."""
-    ticks = [tick for power in range(-2, 4) for tick in (10.0**power, 2 * 10.0**power, 5 * 10.0**power) if tick <= highest]
-    axis.set_major_locator(FixedLocator(ticks))
-    axis.set_minor_locator(NullLocator())
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    ticks_at(axis, [tick for power in range(-2, 4) for tick in (10.0**power, 2 * 10.0**power, 5 * 10.0**power) if tick <= highest])
 
 
 def line_at(axes, value, text, horizontal=True):
@@ -125,13 +128,16 @@ def tre_histogram(groups, success_mm):
         shares = [100 * count / max(1, len(starts)) for count in counts]
         left = [low * 10 ** (place / 8 / len(groups)) for low in edges]
         widths = [low * (10 ** (0.92 / 8 / len(groups)) - 1) for low in left]
-        axes.bar(left, shares, widths, align="edge", color=COLORS[place % 6], label=label)
+        # One outline instead of a patch per bar, which would take half the drawing's time.
+        axes.fill_between([x for low, width in zip(left, widths) for x in (low, low, low + width, low + width)],
+                          [y for share in shares for y in (0, share, share, 0)], color=COLORS[place % 6], linewidth=0, label=label)
     axes.set_xscale("log")
     axes.set_xlim(LOWEST_MM, HIGHEST_MM * 10 ** (1 / 8))
     millimetres(axes.xaxis, HIGHEST_MM / 2)
     axes.grid(axis="x", visible=False)
     line_at(axes, success_mm, f"success: below {success_mm:g} mm", horizontal=False)
     axes.set(xlabel="TRE (mm); at the right edge: 100 mm and more, no pose", ylabel="share of starts (%)")
+    axes.set_ylim(0)
     axes.legend(loc="upper left")
     return figure, ["group", "low_mm", "high_mm", "starts", "share"], rows
 
@@ -183,7 +189,7 @@ def confidence(groups, success_mm):
     axes.set_xlim(lowest / 5, 1 - lowest / 2)
     ticks = {lowest / 3: "0", lowest: "≤ 0.001", 0.01: "0.01", 0.1: "0.1", 0.5: "0.5", 0.9: "0.9", 0.99: "0.99", 1 - lowest: "≥ 0.999"}
     axes.set_xticks(list(ticks), list(ticks.values()), fontsize=9)
-    axes.xaxis.set_minor_locator(NullLocator())
+    axes.set_xticks([], minor=True)
     axes.set_ylim(LOWEST_MM, max(HIGHEST_MM, axes.get_ylim()[1]))
     millimetres(axes.yaxis, axes.get_ylim()[1])
     axes.set(xlabel="confidence that the end is right; 0: the verdict is not found", ylabel="final TRE (mm)")
@@ -279,7 +285,7 @@ def field_parameters(run):
         axes.errorbar(x, middle, yerr=spread, fmt="o:", capsize=3, color=BLUE)
         axes.plot([base[key]], [base["psnr_db"]["median"]], "o", color=VERMILION, markersize=8)
         axes.set_xscale("log")
-        axes.xaxis.set_minor_locator(NullLocator())
+        axes.set_xticks([], minor=True)
         axes.set_xticks(x, [f"{value:g}" for value in x])
         axes.set(xlabel=label, ylabel="PSNR (dB)")
     everything = [as_number(setting["psnr_db"][part]) for setting in settings for part in ("q1", "q3")]

@@ -1,16 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Figures and tables of a job and a benchmark: jobs/rate-against-truth.sh and bench-scaling."""
-from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
-
-from .figures import BLUE, COLORS, GREEN, INK, PURPLE, QUIET, VERMILION, new_figure, save
+from .figures import BLUE, COLORS, GREEN, INK, PURPLE, QUIET, VERMILION, new_figure, save, ticks_at
 from .files import rows_of
 from .tables import markdown
-
-
-def plain_ticks(axis, values):
-    axis.set_major_locator(FixedLocator(values))
-    axis.set_minor_locator(NullLocator())
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
 def scaling(path, _):
@@ -26,7 +18,7 @@ def scaling(path, _):
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set(xlabel="ranks", ylabel="seconds")
-    plain_ticks(axes.xaxis, (1, 4, 16, 64, 256, 1024, 4096))
+    ticks_at(axes.xaxis, (1, 4, 16, 64, 256, 1024, 4096))
     axes.legend(loc="center left", bbox_to_anchor=(1, 0.5))
     save((figure, None, None), path.with_suffix(""))
     return ""
@@ -45,7 +37,7 @@ def panel(axes, rows, column, title):
                           label=anatomy if kind == "standard" else None)
     axes.set_xscale("log", base=2)
     axes.set(title=title, xlabel="MB per camera")
-    plain_ticks(axes.xaxis, (0.25, 0.5, 1, 2, 4, 8, 16, 32))
+    ticks_at(axes.xaxis, (0.25, 0.5, 1, 2, 4, 8, 16, 32))
     axes.legend(fontsize=8)
 
 
@@ -83,12 +75,12 @@ def rates(path, _):
         panel(axes, of(variant, "2"), "registration_ms", f"registration, ms: {variant}, two views")
     for axes in panels[1:]:
         axes.set_yscale("log", base=2)
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.yaxis.set_major_formatter("{x:g}")
     save((figure, None, None), path.parent / "rate")
     figure, panels = new_figure("", (11, 7), 2, 2)
     for axes, (views, variant) in zip(panels, ((views, variant) for views in "21" for variant in ("clean", "stressed"))):
         panel(axes, of(variant, views), "median_distance_mm", f"from ray casting's end, mm: {variant}, views: {views}")
         axes.set_yscale("log")
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.yaxis.set_major_formatter("{x:g}")
     save((figure, None, None), path.parent / "distance")
     return rate_tables(rows)
