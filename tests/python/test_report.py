@@ -267,6 +267,14 @@ class Program(Copied):
         self.assertEqual(sum(int(row["starts"]) for row in rows), sum(entry["starts"] for entry in self.summary("registration")["renderers"]))
         self.assertIn("| Run | Succeeded |", run(self.folder / "error-budget"))
 
+    def test_imports_matplotlib_only_to_draw(self):
+        folder = self.folder / "registration"
+        page_of = [sys.executable, "-X", "importtime", str(PROGRAM), str(folder), "-o", str(self.folder / "x.html")]
+        for has_figures in (False, True):
+            done = subprocess.run(page_of, capture_output=True, text=True, check=True)
+            self.assertEqual("matplotlib" not in done.stderr, has_figures)
+            run(folder)
+
     def test_refuses_bad_input_in_one_line(self):
         (self.folder / "empty").mkdir()
         (self.folder / "list.csv").write_text("a,b\n1,2\n")
