@@ -5,25 +5,44 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
+#include <optional>
 #include <utility>
 
 #include "base/error.h"
 #include "base/hash_random.h"
 #include "evaluate/simulate/parallel_rows.h"
+#include "evaluate/simulate/solid_chords.h"
 #include "geometry/rigid_transform.h"
 
 namespace af {
 
 namespace {
 
-constexpr int kAirHu = -1000;
+constexpr std::int16_t kAirHu = -1000;
+
+/// Convex bodies by whose chords most points of a row need not be asked whether they lie in a body.
+struct RowFinder {
+  explicit RowFinder(const Solid& solid) : wide(solid) {
+    constexpr double kShare = 1e-6;  // far above rounding
+    const bool is_convex = solid.shape != Solid::Shape::HalfEllipsoid && solid.waist == 0.0;
+    if (solid.shape == Solid::Shape::HalfEllipsoid) wide.shape = Solid::Shape::Ellipsoid;
+    wide.waist = 0.0;
+    if (is_convex) sure = wide;
+    wide.half_sizes_mm *= 1.0 + kShare;
+    if (sure) sure->half_sizes_mm *= 1.0 - kShare;
+  }
+
+  Solid wide;                 ///< holds the body
+  std::optional<Solid> sure;  ///< within the body
+};
 
 /// The sample points whose mean is one slice of voxels.
 struct SliceSamples {
   Eigen::Vector3d first_point;
   Eigen::Vector3d step_mm;
   std::array<int, 3> count;
-  std::vector<int> hu;
+  std::vector<std::int16_t> hu;
 
   SliceSamples(const CtGrid& grid, int slice, int samples_per_axis)
       : step_mm(grid.spacing_mm / samples_per_axis),
@@ -53,17 +72,34 @@ struct SliceSamples {
   }
 
   void paint(const Solid& solid, const CtBox& bounds) {
+    const RowFinder rows(solid);
     const auto [i0, i1] = range(0, bounds.low_mm.x(), bounds.high_mm.x());
     const auto [j0, j1] = range(1, bounds.low_mm.y(), bounds.high_mm.y());
     const auto [k0, k1] = range(2, bounds.low_mm.z(), bounds.high_mm.z());
     for (int k = k0; k < k1; ++k)
-      for (int j = j0; j < j1; ++j)
-        for (int i = i0; i < i1; ++i) {
-          const Eigen::Vector3d point =
-              first_point + step_mm.cwiseProduct(Eigen::Vector3d(i, j, k));
-          if (!solid.contains(point)) continue;
-          hu[offset(i, j, k)] = solid.hu_at(point);
+      for (int j = j0; j < j1; ++j) {
+        const auto point = [&](int i) {
+          return Eigen::Vector3d(first_point + step_mm.cwiseProduct(Eigen::Vector3d(i, j, k)));
+        };
+        const Eigen::Vector3d row_start = point(0);
+        const auto samples = [&](const Chord& chord, std::pair<int, int> within) {
+          const auto [low, high] =
+              range(0, row_start.x() + chord.first_mm, row_start.x() + chord.last_mm);
+          return std::pair(std::max(low, within.first), std::min(high, within.second));
+        };
+        std::int16_t* row = hu.data() + offset(0, j, k);
+        for (const Chord& outer : chords(rows.wide, row_start, Eigen::Vector3d::UnitX())) {
+          const auto all = samples(outer, {i0, i1});
+          std::pair sure(all.second, all.second);
+          if (rows.sure)
+            for (const Chord& inner : chords(*rows.sure, row_start, Eigen::Vector3d::UnitX()))
+              sure = samples(inner, all);
+          for (int i = all.first; i < all.second; ++i)
+            if ((i >= sure.first && i < sure.second) || solid.contains(point(i)))
+              row[i] = static_cast<std::int16_t>(solid.texture_hu == 0 ? solid.hu
+                                                                       : solid.hu_at(point(i)));
         }
+      }
   }
 
   /// Mean of the samples of voxel (column, row), rounded.
@@ -73,7 +109,7 @@ struct SliceSamples {
       for (int j = 0; j < samples_per_axis; ++j)
         for (int i = 0; i < samples_per_axis; ++i)
           sum += hu[offset(column * samples_per_axis + i, row * samples_per_axis + j, k)];
-    return static_cast<std::int16_t>(std::lround(
+    return static_cast<std::int16_t>(nearest_hu(
         static_cast<double>(sum) / (samples_per_axis * samples_per_axis * samples_per_axis)));
   }
 };
@@ -95,15 +131,15 @@ class LatticeCells {
     // Cells along a ray and beside it fall into different places.
     const auto part = [&](std::size_t axis) { return static_cast<std::uint64_t>(at[axis]); };
     Cell& cell = cells_[(part(0) + 37 * part(1) + 331 * part(2)) % kCells];
-    if (cell.is_empty || cell.at != at) fill(cell, at);
+    // Without the call of std::memcmp() that std::array's comparison is.
+    if (cell.at[0] != at[0] || cell.at[1] != at[1] || cell.at[2] != at[2]) fill(cell, at);
     return cell.corners;
   }
 
  private:
   struct Cell {
-    std::array<std::int64_t, 3> at{};
+    std::array<std::int64_t, 3> at{std::numeric_limits<std::int64_t>::min()};  ///< no point's
     std::array<double, 8> corners{};
-    bool is_empty = true;
   };
   static constexpr std::size_t kCells = 1024;  ///< 96 KiB
 
@@ -113,7 +149,6 @@ class LatticeCells {
                                            at[1] + static_cast<std::int64_t>(corner >> 1U & 1U),
                                            at[2] + static_cast<std::int64_t>(corner >> 2U));
     cell.at = at;
-    cell.is_empty = false;
   }
 
   std::vector<Cell> cells_;
@@ -157,14 +192,16 @@ bool Solid::contains(const Eigen::Vector3d& ct_point_mm) const {
 
 int Solid::hu_at(const Eigen::Vector3d& ct_point_mm) const {
   if (texture_hu == 0) return hu;
-  return hu + static_cast<int>(std::lround(
-                  texture_hu * texture(ct_point_mm + texture_shift_mm, texture_scale_mm)));
+  return hu + nearest_hu(texture_hu * texture(ct_point_mm + texture_shift_mm, texture_scale_mm));
+}
+
+Eigen::Vector3d Solid::reach_mm() const {
+  if (shape != Shape::Capsule) return half_sizes_mm;
+  return {half_sizes_mm.x(), half_sizes_mm.x(), half_sizes_mm.z() + half_sizes_mm.x()};
 }
 
 CtBox Solid::bounds() const {
-  Eigen::Vector3d half = half_sizes_mm;
-  if (shape == Shape::Capsule) half = Eigen::Vector3d(half.x(), half.x(), half.z() + half.x());
-  const Eigen::Vector3d reach = rotation.cwiseAbs() * half;
+  const Eigen::Vector3d reach = rotation.cwiseAbs() * reach_mm();
   return {center_mm - reach, center_mm + reach};
 }
 

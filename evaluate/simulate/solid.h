@@ -31,9 +31,17 @@ struct Solid {
   [[nodiscard]] bool contains(const Eigen::Vector3d& ct_point_mm) const;
   /// HU at a point of the body, with its texture.
   [[nodiscard]] int hu_at(const Eigen::Vector3d& ct_point_mm) const;
+  /// Half the sides of the box along the body's axes around its centre that holds it.
+  [[nodiscard]] Eigen::Vector3d reach_mm() const;
   /// A box along the ct axes that holds the body.
   [[nodiscard]] CtBox bounds() const;
 };
+
+/// std::lround() without a call or a branch: X-rays and voxels round millions of HU.
+inline int nearest_hu(double hu) {
+  const int whole = static_cast<int>(hu);
+  return whole + static_cast<int>(2.0 * (hu - whole));
+}
 
 /// The capsule of radius `radius_mm` around the segment from a to b.
 Solid capsule_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double radius_mm, int hu);

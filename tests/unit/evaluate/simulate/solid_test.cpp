@@ -75,6 +75,43 @@ TEST(Solid, WaistNarrowsACylinderAtHalfHeight) {
               kVolumeTolerance);
 }
 
+TEST(Solid, SamplesHoldWhatTheBodyContains) {
+  const CtGrid grid = cube_grid(45, 0.9);
+  for (const auto shape : {Solid::Shape::Ellipsoid,
+                           Solid::Shape::HalfEllipsoid,
+                           Solid::Shape::EllipticCylinder,
+                           Solid::Shape::Capsule})
+    for (const double waist : {0.0, 0.3}) {
+      Solid solid = tilted(shape);
+      if (shape == Solid::Shape::EllipticCylinder) solid.waist = waist;
+      solid.texture_hu = 200;
+      const CtVolume ct = sample_solids(grid, {solid}, 1, 1);
+      std::size_t voxel = 0;
+      for (int k = 0; k < grid.size[2]; ++k)
+        for (int j = 0; j < grid.size[1]; ++j)
+          for (int i = 0; i < grid.size[0]; ++i, ++voxel) {
+            const Vector3d point = grid.point_mm(Vector3d(i, j, k));
+            // The two may differ in the rounding of a point.
+            EXPECT_NEAR(ct.hu[voxel], solid.contains(point) ? solid.hu_at(point) : -1000, 1);
+          }
+    }
+}
+
+TEST(Solid, RoundsHuAsLround) {
+  for (const double hu : {0.0,
+                          0.5,
+                          -0.5,
+                          0.49999999999999994,
+                          -0.49999999999999994,
+                          2.5,
+                          -2.5,
+                          1023.4999999999999,
+                          -999.5,
+                          -1000.4,
+                          9000.5})
+    EXPECT_EQ(nearest_hu(hu), std::lround(hu)) << hu;
+}
+
 TEST(Solid, BoundsHoldEveryPointInside) {
   HashRandom random(4);
   for (const auto shape :
