@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
+#include <span>
+
 #include <Eigen/Core>
 
 namespace af {
@@ -24,6 +27,14 @@ class RayIntegrator {
   /// source inside the volume starts there.
   [[nodiscard]] virtual PathIntegrals integrate(const Eigen::Vector3d& source_point,
                                                 const Eigen::Vector3d& through_point) const = 0;
+
+  /// Integrals of neighbouring rays, one per sum, each bit for bit what integrate() gives.
+  virtual void integrate_row(const Eigen::Vector3d& source_point,
+                             std::span<const Eigen::Vector3d> through_points,
+                             std::span<PathIntegrals> sums) const {
+    for (std::size_t i = 0; i < through_points.size(); ++i)
+      sums[i] = integrate(source_point, through_points[i]);
+  }
 };
 
 }  // namespace af

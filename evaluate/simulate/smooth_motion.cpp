@@ -79,6 +79,29 @@ Eigen::Vector3d SmoothMotion::displacement_mm(const Eigen::Vector3d& ct_point_mm
   return options_.amplitude_mm * share * displacement;
 }
 
+void SmoothMotion::displace(std::span<Eigen::Vector3d> line_ct_mm) const {
+  const Eigen::Vector3d step_mm =
+      (line_ct_mm.back() - line_ct_mm.front()) / static_cast<double>(line_ct_mm.size() - 1);
+  // The waves' phases turn by the same angles from point to point.
+  Eigen::Array3d phases = phases_rad_.array();
+  Eigen::Array3d turns;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto i = static_cast<Eigen::Index>(axis);
+    phases[i] += wave_vectors_per_mm_[axis].dot(line_ct_mm.front());
+    turns[i] = wave_vectors_per_mm_[axis].dot(step_mm);
+  }
+  Eigen::Array3d sines = phases.sin();
+  Eigen::Array3d cosines = phases.cos();
+  const Eigen::Array3d turn_sines = turns.sin();
+  const Eigen::Array3d turn_cosines = turns.cos();
+  for (Eigen::Vector3d& point : line_ct_mm) {
+    point += options_.amplitude_mm * ramp(point) * sines.matrix();
+    const Eigen::Array3d before = sines;
+    sines = before * turn_cosines + cosines * turn_sines;
+    cosines = cosines * turn_cosines - before * turn_sines;
+  }
+}
+
 double SmoothMotion::largest_mm() const {
   return std::sqrt(3.0) * options_.amplitude_mm;
 }

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 
 #include "ct/ct_volume.h"
 #include "geometry/ct_box.h"
@@ -31,6 +32,10 @@ class SmoothMotion {
 
   /// Displacement (ct, mm) at a point. \test SmoothMotion.VanishesInTheTargetBoxAndItsMargin
   [[nodiscard]] Eigen::Vector3d displacement_mm(const Eigen::Vector3d& ct_point_mm) const;
+
+  /// Moves points at equal distances on a line, at least two, by their displacements; to 1e-12 mm.
+  /// \test SmoothMotion.DisplacesALineAsItsPoints
+  void displace(std::span<Eigen::Vector3d> line_ct_mm) const;
 
   /// No displacement is longer.
   [[nodiscard]] double largest_mm() const;

@@ -69,9 +69,13 @@ std::optional<Chord> capsule_chord(const Solid& solid, const Vector3d& a, const 
 }
 
 /// Adds the parts of `outer` that the waist leaves, to 1e-6 mm; a gap of less than 1/24 of the
-/// chord may stay unseen.
-void add_waist_chords(
-    const Solid& solid, const Vector3d& a, const Vector3d& b, const Chord& outer, Chords& found) {
+/// chord may stay unseen. Only what lies within `wanted` is looked for.
+void add_waist_chords(const Solid& solid,
+                      const Vector3d& a,
+                      const Vector3d& b,
+                      const Chord& outer,
+                      const Chord& wanted,
+                      Chords& found) {
   constexpr int kSamples = 24;
   constexpr int kBisections = 30;
   const auto is_inside = [&](double t) {
@@ -88,19 +92,47 @@ void add_waist_chords(
     return 0.5 * (low + high);
   };
   const double step = (outer.last_mm - outer.first_mm) / kSamples;
+  if (outer.last_mm <= wanted.first_mm || outer.first_mm >= wanted.last_mm) return;
+  const auto first_sample =
+      static_cast<int>(std::max(0.0, std::floor((wanted.first_mm - outer.first_mm) / step)));
+  const auto last_sample = static_cast<int>(
+      std::min<double>(kSamples, std::ceil((wanted.last_mm - outer.first_mm) / step)));
   std::optional<double> entry;
   double last = outer.first_mm;
   bool was_inside = false;
-  for (int i = 0; i <= kSamples; ++i) {
+  for (int i = first_sample; i <= last_sample; ++i) {
     // The ends lie on the body's own flat ends, or on the cylinder around it: a little inwards.
     const double t = outer.first_mm + std::clamp(i * step, 1e-7, (kSamples - 1e-7) * step);
     const bool now_inside = is_inside(t);
-    if (now_inside && !was_inside) entry = i == 0 ? outer.first_mm : surface_between(last, t);
+    if (now_inside && !was_inside)
+      entry = i == first_sample ? outer.first_mm : surface_between(last, t);
     if (!now_inside && was_inside && entry) found.add(*entry, surface_between(last, t));
     was_inside = now_inside;
     last = t;
   }
   if (was_inside && entry) found.add(*entry, outer.last_mm);
+}
+
+/// Whether a face of a box around the origin has all of the segment from a to b beyond it.
+bool lies_beyond_a_face(const Vector3d& a, const Vector3d& b, const Vector3d& half_sizes) {
+  return (a.array() > half_sizes.array() && b.array() > half_sizes.array()).any() ||
+         (a.array() < -half_sizes.array() && b.array() < -half_sizes.array()).any();
+}
+
+/// Whether the body, seen in its own frame, holds all points within `distance_mm` of this one.
+/// Those points that it holds make up a convex body: what holds of two of them holds between.
+bool holds_around(const Solid& solid, const Vector3d& point, double distance_mm) {
+  if (solid.shape == Solid::Shape::Capsule) {
+    const double half = solid.half_sizes_mm.z();
+    const Vector3d from_axis = point - std::clamp(point.z(), -half, half) * Vector3d::UnitZ();
+    return from_axis.norm() <= solid.half_sizes_mm.x() - distance_mm;
+  }
+  const Vector3d unit = point.cwiseQuotient(solid.half_sizes_mm);
+  const double inwards = 1.0 - distance_mm / solid.half_sizes_mm.minCoeff();
+  if (solid.shape == Solid::Shape::EllipticCylinder)
+    return std::abs(unit.z()) <= inwards && unit.head<2>().norm() <= inwards - solid.waist;
+  if (solid.shape == Solid::Shape::HalfEllipsoid && point.z() < distance_mm) return false;
+  return unit.norm() <= inwards;
 }
 
 }  // namespace
@@ -110,9 +142,17 @@ void Chords::add(double first_mm, double last_mm) {
     items[static_cast<std::size_t>(count++)] = {first_mm, last_mm};
 }
 
-Chords chords(const Solid& solid, const Vector3d& origin, const Vector3d& direction) {
+Chords chords(const Solid& solid,
+              const Vector3d& origin,
+              const Vector3d& direction,
+              const Chord& wanted) {
+  constexpr double kMarginMm = 1e-6;  // far above rounding
   const Vector3d a = solid.rotation.transpose() * (origin - solid.center_mm);
   const Vector3d b = solid.rotation.transpose() * direction;
+  if (lies_beyond_a_face(a + wanted.first_mm * b,
+                         a + wanted.last_mm * b,
+                         solid.reach_mm() + Vector3d::Constant(kMarginMm)))
+    return {};
   const Vector3d unit_a = a.cwiseQuotient(solid.half_sizes_mm);
   const Vector3d unit_b = b.cwiseQuotient(solid.half_sizes_mm);
   Chords found;
@@ -125,7 +165,7 @@ Chords chords(const Solid& solid, const Vector3d& origin, const Vector3d& direct
       chord = common(within_radius(unit_a.head<2>().eval(), unit_b.head<2>().eval(), 1.0),
                      within_slab(unit_a.z(), unit_b.z(), -1.0, 1.0));
       if (chord && solid.waist > 0.0) {
-        add_waist_chords(solid, unit_a, unit_b, *chord, found);
+        add_waist_chords(solid, unit_a, unit_b, *chord, wanted, found);
         return found;
       }
       break;
@@ -139,6 +179,15 @@ Chords chords(const Solid& solid, const Vector3d& origin, const Vector3d& direct
   }
   if (chord) found.add(chord->first_mm, chord->last_mm);
   return found;
+}
+
+Place place_of(const Solid& solid, const Vector3d& from, const Vector3d& to, double distance_mm) {
+  const Vector3d a = solid.rotation.transpose() * (from - solid.center_mm);
+  const Vector3d b = solid.rotation.transpose() * (to - solid.center_mm);
+  if (lies_beyond_a_face(a, b, solid.reach_mm() + Vector3d::Constant(distance_mm)))
+    return Place::Off;
+  return holds_around(solid, a, distance_mm) && holds_around(solid, b, distance_mm) ? Place::Around
+                                                                                    : Place::Near;
 }
 
 }  // namespace af

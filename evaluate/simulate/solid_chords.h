@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 
 #include "evaluate/simulate/solid.h"
 
@@ -13,6 +14,9 @@ struct Chord {
   double last_mm;
 };
 
+inline constexpr Chord kWholeLine{-std::numeric_limits<double>::infinity(),
+                                  std::numeric_limits<double>::infinity()};
+
 /// Up to two chords: a body with a waist is not convex.
 struct Chords {
   std::array<Chord, 2> items{};
@@ -23,7 +27,25 @@ struct Chords {
   [[nodiscard]] const Chord* end() const { return items.data() + count; }
 };
 
-/// Where the line origin + t direction (unit) is inside a body; a tangent has none.
-Chords chords(const Solid& solid, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction);
+/// Where the line origin + t direction (unit) is inside a body; a tangent has none. Outside the
+/// part `wanted` of the line chords may be missing, or end elsewhere.
+Chords chords(const Solid& solid,
+              const Eigen::Vector3d& origin,
+              const Eigen::Vector3d& direction,
+              const Chord& wanted = kWholeLine);
+
+/// How a body lies to all points within a distance of a segment.
+enum class Place {
+  Off,     ///< holds none of them
+  Around,  ///< holds all
+  Near,    ///< neither for certain
+};
+
+/// Of the segment from `from` to `to` (ct, mm).
+/// \test PlaceOf.IsThatOfTheTubesPoints
+Place place_of(const Solid& solid,
+               const Eigen::Vector3d& from,
+               const Eigen::Vector3d& to,
+               double distance_mm);
 
 }  // namespace af

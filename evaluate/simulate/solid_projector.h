@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "drr/tissue_model.h"
@@ -15,7 +16,8 @@ namespace af {
 /// closed form (those of a waist by bisection to 1e-6 mm), between them the body that was painted
 /// last, textures by the midpoints of steps of at most 1.5 mm. So X-rays share no voxel grid with
 /// the CT that registers them. With a motion the ray is followed through the anatomy as a polyline,
-/// one piece every 8 mm. Ends at the faces of the phantom's volume.
+/// one piece every 8 mm. Ends at the faces of the phantom's volume. Which bodies are where is found
+/// for many neighbouring rays at once.
 /// \test SolidProjector.EqualsClosedFormsOfSingleBodies
 class SolidProjector : public RayIntegrator {
  public:
@@ -26,6 +28,9 @@ class SolidProjector : public RayIntegrator {
 
   [[nodiscard]] PathIntegrals integrate(const Eigen::Vector3d& source_point,
                                         const Eigen::Vector3d& through_point) const override;
+  void integrate_row(const Eigen::Vector3d& source_point,
+                     std::span<const Eigen::Vector3d> through_points,
+                     std::span<PathIntegrals> sums) const override;
 
  private:
   struct Ball {  ///< around a body
@@ -39,31 +44,46 @@ class SolidProjector : public RayIntegrator {
     bool is_entry;
   };
   class OpenBodies;
-  /// A body that the X-ray's ray may cross, and where on it.
-  struct Candidate {
-    int solid;
-    double ray_first_mm;
-    double ray_last_mm;
-  };
   /// A straight piece of the way through the anatomy.
   struct Piece {
-    double ray_first_mm;  ///< on the X-ray's ray
-    double ray_last_mm;
     Eigen::Vector3d origin;
     Eigen::Vector3d direction;  ///< unit
     double length_mm;           ///< in the anatomy
     double stretch;             ///< mm of the X-ray's ray per mm of it
   };
+  using Way = std::vector<Piece>;
+  /// All points within a distance of a segment: around the pieces of neighbouring rays.
+  struct Tube {
+    Eigen::Vector3d from;
+    Eigen::Vector3d to;
+    double radius_mm;
 
-  [[nodiscard]] std::vector<Piece> pieces(const Eigen::Vector3d& source_point,
-                                          const Eigen::Vector3d& direction) const;
-  [[nodiscard]] std::vector<Candidate> candidates(const Eigen::Vector3d& source_point,
-                                                  const Eigen::Vector3d& direction) const;
-  /// Crossings with surfaces along the piece, in order.
+    [[nodiscard]] Eigen::Vector3d middle() const { return 0.5 * (from + to); }
+  };
+  /// Bodies of a tube, ascending: those that hold all of it, and others that may reach into it.
+  struct Bodies {
+    std::vector<int> around;
+    std::vector<int> near;
+  };
+
+  void find_way(const Eigen::Vector3d& source_point,
+                const Eigen::Vector3d& direction,
+                Way& way) const;
+  /// Bodies that rays within an angle of this sine about `direction` may cross.
+  [[nodiscard]] std::vector<int> candidates(const Eigen::Vector3d& source_point,
+                                            const Eigen::Vector3d& direction,
+                                            double sine) const;
+  /// Around the first, second ... pieces of all ways.
+  [[nodiscard]] static std::vector<Tube> tubes(std::span<const Way> ways);
+  /// The bodies of each tube; no body that is not among `candidates` reaches into one.
+  void sort_into(const std::vector<Tube>& tubes,
+                 const std::vector<int>& candidates,
+                 std::vector<Bodies>& bodies) const;
+  /// Crossings with surfaces of these bodies along the piece, in order.
   void find_crossings(const Piece& piece,
-                      const std::vector<Candidate>& candidates,
+                      const std::vector<int>& near,
                       std::vector<Crossing>& crossings) const;
-  /// `open` is empty before and after.
+  /// `open` holds the bodies around the piece, and at the end those at its end.
   void add_piece(const Piece& piece,
                  const std::vector<Crossing>& crossings,
                  OpenBodies& open,

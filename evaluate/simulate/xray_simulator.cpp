@@ -2,6 +2,7 @@
 #include "evaluate/simulate/xray_simulator.h"
 
 #include <utility>
+#include <vector>
 
 #include "evaluate/simulate/parallel_rows.h"
 #include "evaluate/simulate/solid_projector.h"
@@ -51,13 +52,6 @@ XraySimulator::XraySimulator(const Phantom& phantom,
       steel_(std::move(steel)),
       options_(options) {}
 
-double XraySimulator::transmission(const Eigen::Vector3d& source_ct_mm,
-                                   const Eigen::Vector3d& detector_ct_mm) const {
-  const PathIntegrals path = projector_->integrate(source_ct_mm, detector_ct_mm);
-  return beam_.transmission(
-      {path.water_mm, path.bone_mm, steel_.chord_length_mm(source_ct_mm, detector_ct_mm)});
-}
-
 Image2d XraySimulator::primary_image(const CameraGeometry& camera,
                                      const RigidTransform& room_from_ct,
                                      const ProgressCallback& progress) const {
@@ -68,9 +62,18 @@ Image2d XraySimulator::primary_image(const CameraGeometry& camera,
       primary.height,
       options_.threads,
       [&](int row) {
+        std::vector<Eigen::Vector3d> pixels_ct_mm;
         for (int column = 0; column < primary.width; ++column)
+          pixels_ct_mm.push_back(ct_from_room * camera.detector_point(column, row));
+        std::vector<PathIntegrals> paths(pixels_ct_mm.size());
+        projector_->integrate_row(source_ct_mm, pixels_ct_mm, paths);
+        for (int column = 0; column < primary.width; ++column) {
+          const auto i = static_cast<std::size_t>(column);
           primary.at(column, row) = static_cast<float>(
-              transmission(source_ct_mm, ct_from_room * camera.detector_point(column, row)));
+              beam_.transmission({paths[i].water_mm,
+                                  paths[i].bone_mm,
+                                  steel_.chord_length_mm(source_ct_mm, pixels_ct_mm[i])}));
+        }
       },
       progress);
   return primary;

@@ -68,9 +68,6 @@ class XraySimulator {
   [[nodiscard]] const BeamTransmission& beam() const { return beam_; }
 
  private:
-  [[nodiscard]] double transmission(const Eigen::Vector3d& source_ct_mm,
-                                    const Eigen::Vector3d& detector_ct_mm) const;
-
   TissueModel tissue_;
   std::unique_ptr<const RayIntegrator> projector_;
   BeamTransmission beam_;

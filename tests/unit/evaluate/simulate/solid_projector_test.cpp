@@ -2,7 +2,10 @@
 #include "evaluate/simulate/solid_projector.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -31,6 +34,20 @@ Phantom phantom_of_bodies(std::vector<Solid> solids) {
 double all_mm(const RayIntegrator& projector, const Vector3d& source, const Vector3d& through) {
   const PathIntegrals path = projector.integrate(source, through);
   return path.water_mm + path.bone_mm;
+}
+
+/// Every shape in turn, and cylinders with a waist and without.
+Solid random_solid(HashRandom& random, int trial) {
+  Solid solid;
+  solid.shape = static_cast<Solid::Shape>(trial % 4);
+  solid.half_sizes_mm = {
+      random.uniform(3.0, 9.0), random.uniform(3.0, 9.0), random.uniform(3.0, 9.0)};
+  solid.center_mm = {random.uniform(-2.0, 2.0), 0.5, -0.5};
+  solid.rotation =
+      Eigen::AngleAxisd(random.uniform(0.0, 3.0), Vector3d(1.0, 0.4, -0.7).normalized())
+          .toRotationMatrix();
+  if (solid.shape == Solid::Shape::EllipticCylinder) solid.waist = trial % 8 < 4 ? 0.1 : 0.0;
+  return solid;
 }
 
 TEST(SolidProjector, EqualsClosedFormsOfSingleBodies) {
@@ -90,15 +107,7 @@ TEST(Chords, OfEveryShapeAreWhereTheBodyIs) {
   constexpr double kStepMm = 0.01;
   HashRandom random(3);
   for (int trial = 0; trial < 300; ++trial) {
-    Solid solid;
-    solid.shape = static_cast<Solid::Shape>(trial % 4);
-    solid.half_sizes_mm = {
-        random.uniform(3.0, 9.0), random.uniform(3.0, 9.0), random.uniform(3.0, 9.0)};
-    solid.center_mm = {random.uniform(-2.0, 2.0), 0.5, -0.5};
-    solid.rotation =
-        Eigen::AngleAxisd(random.uniform(0.0, 3.0), Vector3d(1.0, 0.4, -0.7).normalized())
-            .toRotationMatrix();
-    if (solid.shape == Solid::Shape::EllipticCylinder) solid.waist = trial % 8 < 4 ? 0.1 : 0.0;
+    const Solid solid = random_solid(random, trial);
     const Vector3d origin(random.uniform(-6.0, 6.0), -25.0, random.uniform(-6.0, 6.0));
     const Vector3d direction = Vector3d(random.uniform(-0.2, 0.2), 1.0, 0.1).normalized();
     double inside_mm = 0.0;
@@ -109,6 +118,76 @@ TEST(Chords, OfEveryShapeAreWhereTheBodyIs) {
       chord_mm += chord.last_mm - chord.first_mm;
     EXPECT_NEAR(chord_mm, inside_mm, 4.0 * kStepMm + chord_mm * (solid.waist > 0.0 ? 0.05 : 0.0))
         << trial;
+  }
+}
+
+TEST(Chords, OfAPartOfALineAreThoseOfTheWholeWithinIt) {
+  HashRandom random(5);
+  int found = 0;
+  for (int trial = 0; trial < 2000; ++trial) {
+    const Solid solid = random_solid(random, trial);
+    const Vector3d origin(random.uniform(-6.0, 6.0), -25.0, random.uniform(-6.0, 6.0));
+    const Vector3d direction = Vector3d(random.uniform(-0.2, 0.2), 1.0, 0.1).normalized();
+    const double first_mm = random.uniform(0.0, 50.0);
+    const Chord wanted{first_mm, first_mm + random.uniform(1.0, 30.0)};
+    const auto within = [&](const Chords& all) {
+      std::vector<double> ends_mm;
+      for (const Chord& chord : all) {
+        const double low = std::max(chord.first_mm, wanted.first_mm);
+        const double high = std::min(chord.last_mm, wanted.last_mm);
+        if (low < high) ends_mm.insert(ends_mm.end(), {low, high});
+      }
+      return ends_mm;
+    };
+    const std::vector<double> whole = within(chords(solid, origin, direction));
+    EXPECT_EQ(within(chords(solid, origin, direction, wanted)), whole) << trial;
+    found += whole.empty() ? 0 : 1;
+  }
+  EXPECT_GT(found, 300);
+}
+
+TEST(PlaceOf, IsThatOfTheTubesPoints) {
+  HashRandom random(9);
+  std::array<int, 3> places{};
+  for (int trial = 0; trial < 4000; ++trial) {
+    const Solid solid = random_solid(random, trial);
+    const auto draw = [&](double reach) {
+      return Vector3d(random.uniform(-reach, reach),
+                      random.uniform(-reach, reach),
+                      random.uniform(-reach, reach));
+    };
+    const Vector3d from = draw(trial % 3 == 0 ? 14.0 : 4.0);
+    const Vector3d to = from + draw(4.0);
+    const double radius_mm = random.uniform(0.2, 1.5);
+    const Place place = place_of(solid, from, to, radius_mm);
+    ++places[static_cast<std::size_t>(place)];
+    for (int i = 0; i < 50 && place != Place::Near; ++i) {
+      const Vector3d aside = random.uniform(0.0, radius_mm) * draw(1.0).normalized();
+      const Vector3d point = from + random.uniform() * (to - from) + aside;
+      EXPECT_EQ(solid.contains(point), place == Place::Around) << trial;
+    }
+  }
+  for (const int count : places) EXPECT_GT(count, 100);
+}
+
+TEST(SolidProjector, GivesARayOfARowWhatItGivesTheRayAlone) {
+  const Phantom phantom = make_phantom("spine", true, 4);
+  const SmoothMotion motion(phantom.target.box_ct, {}, 7, 8);
+  for (const bool moves : {false, true}) {
+    const SolidProjector bodies(
+        phantom, tissue(), moves ? std::optional(motion) : std::optional<SmoothMotion>());
+    for (double z = -150.0; z <= 150.0; z += 60.0) {
+      std::vector<Vector3d> points;
+      for (double x = -300.0; x <= 300.0; x += 7.0) points.emplace_back(x, 250.0, z);
+      std::vector<PathIntegrals> sums(points.size());
+      const Vector3d source(40.0, -640.0, 30.0);
+      bodies.integrate_row(source, points, sums);
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        const PathIntegrals alone = bodies.integrate(source, points[i]);
+        EXPECT_EQ(sums[i].water_mm, alone.water_mm) << moves << ' ' << z << ' ' << i;
+        EXPECT_EQ(sums[i].bone_mm, alone.bone_mm) << moves << ' ' << z << ' ' << i;
+      }
+    }
   }
 }
 

@@ -275,6 +275,23 @@ TEST(SmoothMotion, NeverFoldsSpace) {
   }
 }
 
+TEST(SmoothMotion, DisplacesALineAsItsPoints) {
+  const SmoothMotion motion(still_box, {}, 5, 6);
+  const Vector3d step_mm(3.0, -6.0, 4.0);
+  std::vector<Vector3d> points;
+  for (int i = 0; i < 60; ++i) points.emplace_back(Vector3d(-90.0, 180.0, -120.0) + i * step_mm);
+  std::vector<Vector3d> displaced = points;
+  motion.displace(displaced);
+  int still = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Vector3d expected = points[i] + motion.displacement_mm(points[i]);
+    EXPECT_LT((displaced[i] - expected).norm(), 1e-12) << i;
+    still += expected == points[i] ? 1 : 0;
+  }
+  EXPECT_GT(still, 1);
+  EXPECT_LT(still, 30);
+}
+
 TEST(SmoothMotion, MovesVoxelsOutsideTheBoxAndKeepsThoseWithin) {
   const CtVolume ct = textured({60, 60, 60}, 3.0);
   SmoothMotionOptions options;
