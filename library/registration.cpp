@@ -145,8 +145,8 @@ struct RegistrationCase::Impl {
            const registration::RegistrationOptions& method) {
     registration::Registration made(problem, method, pool);
     made.examine_ends(uncertainty, pool);
-    registration.emplace(std::move(made));
     const std::lock_guard lock(problem_mutex_);
+    registration.emplace(std::move(made));
     problem_ = problem;
   }
 

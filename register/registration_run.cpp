@@ -237,7 +237,8 @@ void run_registration(const RegisterOptions& typed,
   if (options.renderer == "raycast" && options.renderer != typed.renderer && world.is_root())
     std::cout << kCastsWithoutFields;
   const auto pool = std::make_shared<ThreadPool>(thread_count(options.method.threads));
-  const LoadedCase loaded = load_problem(options, method, registered, pool, world);
+  LoadedCase loaded = load_problem(options, method, registered, pool, world);
+  loaded.xray_readers.clear();  // no other X-rays follow
   const auto& problem = loaded.problem;
   Registration registration = all_or_none(world, [&] {
     Registration made(problem, method, pool);

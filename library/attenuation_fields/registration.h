@@ -110,6 +110,7 @@ class ATTENUATION_FIELDS_API RegistrationCase {
   /// study's `xray_domain` says. They are checked and prepared as if the study's file had held them
   /// (and no header, such as DICOM's): the study's air level, flat and dark fields, distortion,
   /// mask and fiducials apply, and registrations have the bits of a case that was loaded with them.
+  /// Start and gold standard stay the study's.
   /// Returns what is odd about them. InputError, which leaves the case as it was.
   std::vector<std::string> set_xray(const std::string& camera, std::span<const float> xray);
   std::vector<std::string> set_xrays(const std::map<std::string, std::span<const float>>& xrays);

@@ -261,7 +261,7 @@ void bind_case(py::module_& module) {
                                "tube_kvp"_a = Beam{}.tube_kvp,
                                "aluminium_mm"_a = Beam{}.aluminium_mm,
                                "scatter_to_primary"_a = Beam{}.scatter_to_primary,
-                               "Options are those of af-register.");
+                               "As af-register, but casts rays only if renderer says so.");
   def_made_again(registration_case, "registration_case");
   registration_case.def(
       "set_xrays",
@@ -270,7 +270,8 @@ void bind_case(py::module_& module) {
       "Registers other X-rays from now on: arrays (h, w) by camera, in the domain that the study's "
       "xray_domain says. They are checked and prepared as if the study's file had held them, and "
       "registrations have the bits of a case that was loaded with them; fields and CT are not "
-      "read again. An InputError leaves the case as it was.");
+      "read again. Start, gold standard and masks stay the study's. One thread at a time. An "
+      "InputError leaves the case as it was.");
   registration_case.def(
       "set_xray",
       [](PythonCase& self, const std::string& camera, const Numbers& xray) {
@@ -281,7 +282,7 @@ void bind_case(py::module_& module) {
       "set_xrays() of one camera.");
   registration_case.def_property_readonly("name", &RegistrationCase::name);
   registration_case.def_property_readonly(
-      "views", &views_of, "The X-rays in force, with their cameras and regions of interest.");
+      "views", &views_of, "The X-rays in force, as attenuation, with their cameras and regions of interest.");
   registration_case.def_property_readonly("frame",
                                           [](const PythonCase& self) { return self.frame(); });
   registration_case.def_property_readonly(
