@@ -282,7 +282,9 @@ void bind_case(py::module_& module) {
       "set_xrays() of one camera.");
   registration_case.def_property_readonly("name", &RegistrationCase::name);
   registration_case.def_property_readonly(
-      "views", &views_of, "The X-rays in force, as attenuation, with their cameras and regions of interest.");
+      "views",
+      &views_of,
+      "The X-rays in force, as attenuation, with their cameras and regions of interest.");
   registration_case.def_property_readonly("frame",
                                           [](const PythonCase& self) { return self.frame(); });
   registration_case.def_property_readonly(
