@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -42,8 +43,13 @@ int main(int argc, char** argv) {
                                                      report_command(app),
                                                      method_command(app)};
   const std::string command_line = af::cli::command_line(argc, argv);
-  return af::cli::app_main(app, argc, argv, [&](const af::Communicator& world) {
+  const auto run = [&](const af::Communicator& world) {
     for (const af::cli::SubCommand& command : commands)
       if (command.app->parsed()) command.run(command_line, world);
+  };
+  return af::cli::app_main(app, argc, argv, run, [&] {
+    return std::ranges::any_of(commands, [](const af::cli::SubCommand& command) {
+      return command.writes_by_mpi && command.app->parsed();
+    });
   });
 }

@@ -359,6 +359,7 @@ cli::SubCommand field_parameters_command(CLI::App& app) {
       "time and compression (the paper's Fig. 10 and Table I); builds the fields that are missing",
       run_field_parameters,
       options);
+  command.writes_by_mpi = true;  // fields
   cli::bind_run_limits(*command.app);
   return command;
 }
