@@ -71,16 +71,6 @@ bool pays_to_decode(const CompressedAttenuationField& field) {
          (field.slabs.size() > 1 && decoded_bytes(field) <= kMostDecodedBytes);
 }
 
-/// Collective where the memory is. The level above `level`, or level 1 where there is none: of a
-/// field that is looked up by its codewords.
-std::shared_ptr<const FieldLevel> level_above(
-    const std::shared_ptr<const CompressedAttenuationField>& field,
-    const std::shared_ptr<const FieldLevel>& level,
-    const FieldLevelMemory& memory) {
-  if (level) return std::make_shared<const FieldLevel>(next_field_level(level, memory));
-  return make_field_pyramid(field, 1, memory).front();
-}
-
 /// Collective where the memory is. A field's renderers for a view: its own, and those of so many
 /// levels of its pyramid. A method's levels are those of a field of about 256 nodes: a finer field
 /// begins with more halvings, so that a level has about the same blur. The field itself is looked
@@ -96,21 +86,19 @@ FieldRenderers renderers_of(const std::shared_ptr<const CompressedAttenuationFie
   const int halvings = levels > 0 ? levels + more_halvings : 0;
   FieldRenderers made;
   made.look_up = look_up_of_searches(look_up, field->slabs.size());
-  std::shared_ptr<const FieldLevel> level;
+  FieldLevels pyramid;
   if (pays_to_decode(*field)) {
-    level = std::make_shared<const FieldLevel>(decode_field(field, memory));
-    made.levels.push_back(make_field_renderer(level, made.look_up, pool));
+    const auto samples = std::make_shared<const FieldLevel>(decode_field(field, memory));
+    made.levels.push_back(make_field_renderer(samples, made.look_up, pool));
+    if (halvings > 0) pyramid = make_field_pyramid(samples, halvings, memory, more_halvings);
   } else {
     made.levels.push_back(make_field_renderer(field, made.look_up, pool));
+    if (halvings > 0) pyramid = make_field_pyramid(field, halvings, memory, more_halvings);
   }
-  for (int i = 1; i <= halvings; ++i) {
-    const bool is_looked_up = i > more_halvings;
-    // Of levels that are only halved further, what is made is of use to its process alone.
-    level = level_above(field, level, is_looked_up ? memory : process_memory());
-    if (!is_looked_up) continue;
+  for (auto i = static_cast<std::size_t>(more_halvings); i < pyramid.size(); ++i) {
     made.levels.push_back(
-        std::make_shared<const TwoPassAfDrr>(level, TwoPassOptions{}, coarse_pool));
-    made.blur_sigma_mm.push_back(level->blur_sigma_mm(true));
+        std::make_shared<const TwoPassAfDrr>(pyramid[i], TwoPassOptions{}, coarse_pool));
+    made.blur_sigma_mm.push_back(pyramid[i]->blur_sigma_mm(true));
   }
   return made;
 }

@@ -297,10 +297,22 @@ FieldLevelSlab merged_slab(const std::shared_ptr<const FieldLevel>& from,
   return {merging->geometry(), {extent, memory, make_tile}, slabs[0].weight + slabs[1].weight};
 }
 
-/// Up to coarsest_level, each from the one before.
-void append_levels(int coarsest_level, const FieldLevelMemory& memory, FieldLevels& levels) {
-  while (static_cast<int>(levels.size()) < coarsest_level)
-    levels.push_back(std::make_shared<const FieldLevel>(next_field_level(levels.back(), memory)));
+/// Memory for a level: up to `stepping_stones`, of this process.
+FieldLevelMemory memory_of(int level, const FieldLevelMemory& memory, int stepping_stones) {
+  return level <= stepping_stones ? process_memory() : memory;
+}
+
+/// From level 1 up to coarsest_level, each from the one before.
+FieldLevels pyramid_from(FieldLevel level_1,
+                         int coarsest_level,
+                         const FieldLevelMemory& memory,
+                         int stepping_stones) {
+  check(coarsest_level >= 1, "a pyramid begins at level 1");
+  FieldLevels levels{std::make_shared<const FieldLevel>(std::move(level_1))};
+  for (int level = 2; level <= coarsest_level; ++level)
+    levels.push_back(std::make_shared<const FieldLevel>(
+        next_field_level(levels.back(), memory_of(level, memory, stepping_stones))));
+  return levels;
 }
 
 }  // namespace
@@ -387,23 +399,27 @@ FieldLevel next_field_level(const std::shared_ptr<const FieldLevel>& level,
 
 FieldLevels make_field_pyramid(const std::shared_ptr<const CompressedAttenuationField>& field,
                                int coarsest_level,
-                               const FieldLevelMemory& memory) {
+                               const FieldLevelMemory& memory,
+                               int stepping_stones) {
   if (field->slabs.size() > 1)
-    return make_field_pyramid(
-        std::make_shared<const FieldLevel>(decode_field(field)), coarsest_level, memory);
-  check(coarsest_level >= 1, "a pyramid begins at level 1");
-  FieldLevels levels{std::make_shared<const FieldLevel>(decode_halved_field(field, memory))};
-  append_levels(coarsest_level, memory, levels);
-  return levels;
+    return make_field_pyramid(std::make_shared<const FieldLevel>(decode_field(field)),
+                              coarsest_level,
+                              memory,
+                              stepping_stones);
+  return pyramid_from(decode_halved_field(field, memory_of(1, memory, stepping_stones)),
+                      coarsest_level,
+                      memory,
+                      stepping_stones);
 }
 
 FieldLevels make_field_pyramid(const std::shared_ptr<const FieldLevel>& level_0,
                                int coarsest_level,
-                               const FieldLevelMemory& memory) {
-  check(coarsest_level >= 1, "a pyramid begins at level 1");
-  FieldLevels levels{std::make_shared<const FieldLevel>(next_field_level(level_0, memory))};
-  append_levels(coarsest_level, memory, levels);
-  return levels;
+                               const FieldLevelMemory& memory,
+                               int stepping_stones) {
+  return pyramid_from(next_field_level(level_0, memory_of(1, memory, stepping_stones)),
+                      coarsest_level,
+                      memory,
+                      stepping_stones);
 }
 
 }  // namespace af

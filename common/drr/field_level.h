@@ -95,14 +95,17 @@ FieldLevel next_field_level(const std::shared_ptr<const FieldLevel>& level,
 using FieldLevels = std::vector<std::shared_ptr<const FieldLevel>>;
 
 /// Levels 1 ... coarsest_level of a compressed field, [0] being level 1; coarsest_level >= 1. The
-/// level 0 of several slabs is in memory of this process.
+/// level 0 of several slabs is in memory of this process, and so are levels 1 ... stepping_stones,
+/// which serve to make those above.
 FieldLevels make_field_pyramid(const std::shared_ptr<const CompressedAttenuationField>& field,
                                int coarsest_level,
-                               const FieldLevelMemory& memory = process_memory());
+                               const FieldLevelMemory& memory = process_memory(),
+                               int stepping_stones = 0);
 /// The same from a field's level 0.
 FieldLevels make_field_pyramid(const std::shared_ptr<const FieldLevel>& level_0,
                                int coarsest_level,
-                               const FieldLevelMemory& memory = process_memory());
+                               const FieldLevelMemory& memory = process_memory(),
+                               int stepping_stones = 0);
 
 /// An axis with half the nodes, midway between pairs of the given ones; InputError, which names the
 /// axis, when there are too few.

@@ -61,12 +61,10 @@ LevelSamples::LevelSamples(const SampleExtent& extent, std::vector<std::uint16_t
 }
 
 const std::uint16_t* LevelSamples::viewpoints(int u, int v, int u_count, int v_count) const {
-  const int b_tiles = tiles_of(extent_.v_nodes);
   for (int a = u / 2; a <= (u + u_count - 1) / 2; ++a)
-    for (int b = v / 2; b <= (v + v_count - 1) / 2; ++b) {
-      std::uint32_t& maker = makers_[static_cast<std::size_t>(a * b_tiles + b)];
-      if (std::atomic_ref(maker).load(std::memory_order_acquire) != kMade) require_tile(a, b);
-    }
+    for (int b = v / 2; b <= (v + v_count - 1) / 2; ++b)
+      if (std::atomic_ref(maker_of(a, b)).load(std::memory_order_acquire) != kMade)
+        require_tile(a, b);
   return samples_.data() +
          static_cast<std::size_t>(u * extent_.v_nodes + v) * extent_.per_viewpoint;
 }
@@ -76,9 +74,12 @@ std::span<const std::uint16_t> LevelSamples::view() const {
   return samples_;
 }
 
+std::uint32_t& LevelSamples::maker_of(int a, int b) const {
+  return makers_[static_cast<std::size_t>(a * tiles_of(extent_.v_nodes) + b)];
+}
+
 void LevelSamples::require_tile(int a, int b) const {
-  const int b_tiles = tiles_of(extent_.v_nodes);
-  const std::atomic_ref maker(makers_[static_cast<std::size_t>(a * b_tiles + b)]);
+  const std::atomic_ref maker(maker_of(a, b));
   const std::uint32_t self = fork_generation() + 1;
   std::uint32_t seen = kNobody;
   while (!maker.compare_exchange_strong(seen, self)) {

@@ -55,6 +55,7 @@ class LevelSamples {
   [[nodiscard]] std::span<const std::uint16_t> view() const;
 
  private:
+  [[nodiscard]] std::uint32_t& maker_of(int a, int b) const;
   void require_tile(int a, int b) const;
 
   SampleExtent extent_;
