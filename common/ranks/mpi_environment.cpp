@@ -3,7 +3,11 @@
 
 #include <atomic>
 #include <cstdlib>
+#include <filesystem>
+#include <optional>
 #include <string>
+#include <system_error>
+#include <unistd.h>
 
 #include <mpi.h>
 
@@ -16,26 +20,43 @@ namespace {
 
 std::atomic<bool> abort_required = false;
 
-/// Hides a step of one task from MPI while this lives. Such a shell, by srun, needs no process
-/// manager, but Open MPI looks for Slurm's and ends the program where there is none.
-class HiddenStep {
+/// An environment variable that has another value while this lives, or none.
+class VariableMeanwhile {
  public:
-  HiddenStep() {
-    const char* const step = std::getenv(kStep);
-    if (!is_only_task() || step == nullptr) return;
-    step_ = step;
-    unsetenv(kStep);
+  VariableMeanwhile(const char* name, const std::optional<std::string>& value) : name_(name) {
+    if (const char* const before = std::getenv(name)) before_ = before;
+    set(value);
   }
-  ~HiddenStep() {
-    if (!step_.empty()) setenv(kStep, step_.c_str(), 1);
-  }
-  HiddenStep(const HiddenStep&) = delete;
-  HiddenStep& operator=(const HiddenStep&) = delete;
+  ~VariableMeanwhile() { set(before_); }
+  VariableMeanwhile(const VariableMeanwhile&) = delete;
+  VariableMeanwhile& operator=(const VariableMeanwhile&) = delete;
 
  private:
-  static constexpr const char* kStep = "SLURM_STEP_ID";
-  std::string step_;
+  void set(const std::optional<std::string>& value) const {
+    if (value)
+      setenv(name_, value->c_str(), 1);
+    else
+      unsetenv(name_);
+  }
+
+  const char* name_;
+  std::optional<std::string> before_;
 };
+
+bool is_usable_folder(const std::string& folder) {
+  std::error_code ignored;
+  return std::filesystem::is_directory(folder, ignored) && access(folder.c_str(), W_OK | X_OK) == 0;
+}
+
+/// The first of the user's folder and the usual ones that can hold files; the user's when none can.
+std::optional<std::string> usable_temporary_folder() {
+  std::optional<std::string> stated;
+  if (const char* const folder = std::getenv("TMPDIR")) stated = folder;
+  for (const std::string& folder :
+       {stated.value_or("/tmp"), std::string("/tmp"), std::string("/dev/shm")})
+    if (is_usable_folder(folder)) return folder;
+  return stated;
+}
 
 }  // namespace
 
@@ -43,24 +64,40 @@ MpiEnvironment::MpiEnvironment(int& argc, char**& argv) {
   // Without mpirun, Open MPI would start a daemon beside the program that could launch more
   // processes. We launch none, and programs start a third faster without it.
   setenv("OMPI_MCA_ess_singleton_isolated", "1", 0);
-  // Nor does it need a folder for them. All programs without mpirun would share one on a machine,
-  // and one that ends removes it while another begins: of starts four at a time, 1 of 600 failed.
-  constexpr const char* kMakesFolder = "OMPI_MCA_orte_create_session_dirs";
-  const bool is_alone = !is_launched();
-  const bool needs_no_folder = is_alone && std::getenv(kMakesFolder) == nullptr;
-  if (needs_no_folder) setenv(kMakesFolder, "0", 0);
   // For shared file pointers, which we never use, Open MPI would make a file per rank beside each
   // file that ranks open together, or one in the folder that there is not. A setting by the user
   // stays.
-  setenv("OMPI_MCA_sharedfp", is_alone ? "^lockedfile,sm" : "^lockedfile", 0);
+  setenv("OMPI_MCA_sharedfp", is_launched() ? "^lockedfile" : "^lockedfile,sm", 0);
+  if (is_launched())
+    init(argc, argv);
+  else
+    init_alone(argc, argv);
+}
+
+void MpiEnvironment::init(int& argc, char**& argv) {
   const bool names_process_manager = std::getenv("OMPI_MCA_pmix") != nullptr;
-  const HiddenStep hidden_step;
   MPI_Init_thread(&argc, &argv, MPI_THREAD_FUNNELED, &thread_level_);
   // Open MPI notes that there is no process manager, which would crash an mpirun that we or our
   // caller start.
   if (!names_process_manager) unsetenv("OMPI_MCA_pmix");
-  // What this program starts may need its folder.
-  if (needs_no_folder) unsetenv(kMakesFolder);
+}
+
+void MpiEnvironment::init_alone(int& argc, char**& argv) {
+  // Alone it needs no folder for the job. All programs without mpirun would share one on a
+  // machine, and one that ends removes it while another begins: of starts four at a time, 1 of 600
+  // failed. What this program starts may need its folder.
+  constexpr const char* kMakesFolder = "OMPI_MCA_orte_create_session_dirs";
+  const char* const makes_folder = std::getenv(kMakesFolder);
+  const VariableMeanwhile no_folder(kMakesFolder, makes_folder == nullptr ? "0" : makes_folder);
+  // Open MPI 5 makes one even so, and crashes where it cannot.
+  const VariableMeanwhile temporary_folder("TMPDIR", usable_temporary_folder());
+  // The shell of a step of one task, by srun, needs no process manager, but Open MPI looks for
+  // Slurm's and ends the program where there is none.
+  constexpr const char* kStep = "SLURM_STEP_ID";
+  const char* const step = std::getenv(kStep);
+  const VariableMeanwhile hidden_step(
+      kStep, is_only_task() || step == nullptr ? std::nullopt : std::optional<std::string>(step));
+  init(argc, argv);
 }
 
 MpiEnvironment::~MpiEnvironment() {

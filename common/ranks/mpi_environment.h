@@ -25,6 +25,9 @@ class MpiEnvironment {
   [[nodiscard]] static bool is_abort_required();
 
  private:
+  void init(int& argc, char**& argv);
+  void init_alone(int& argc, char**& argv);
+
   int thread_level_ = 0;
 };
 
