@@ -53,6 +53,8 @@ export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
 # In a chroot without /sys hwloc complains on standard error of every program, amid what the tests read there.
 export HWLOC_HIDE_ERRORS="${HWLOC_HIDE_ERRORS:-2}"
 keep_folder_of_mpirun
+# A rank that waits would spin on a processor that another test needs.
+export OMPI_MCA_mpi_yield_when_idle=1
 if [[ "$preset" == sanitize ]]; then
   export LSAN_OPTIONS="suppressions=$af_root/tests/support/lsan.supp:print_suppressions=0"
   export ASAN_OPTIONS="fast_unwind_on_malloc=0" UBSAN_OPTIONS="print_stacktrace=1"
