@@ -15,6 +15,7 @@ from .source import is_number, number_of, numbers_text, size_of, toml_text
 
 MOST_BYTES = 1 << 20
 MOST_NUMBERS = 4096  # more than any matrix of a camera has
+MOST_NESTED = 50  # the scanner's time grows with the square
 # Lower case, without '_' and '-'. The first is the one in messages.
 MATRIX = "cameramatrix k m mtx intrinsic intrinsics intrinsicmatrix".split()
 ROTATION = "r rotation rotationmatrix rmat rvec rotationvector".split()
@@ -27,6 +28,11 @@ NEEDS_POSE = ("K alone does not say where the camera stands; add R (3x3, or rvec
 
 class _Loader(yaml.SafeLoader):
     """Nodes only: nothing is constructed, and no alias expanded."""
+
+    def fetch_flow_collection_start(self, TokenClass):
+        if self.flow_level == MOST_NESTED:
+            raise yaml.scanner.ScannerError(None, None, "lists are nested too deeply", self.get_mark())
+        super().fetch_flow_collection_start(TokenClass)
 
     def compose_node(self, parent, index):
         if self.check_event(yaml.AliasEvent):

@@ -98,6 +98,7 @@ def main():
             source = random_.choice(hdf5 if random_.random() < SHARE_OF_HDF5 else others)
             content = mutated(source, random_, others)
             path = folder / "damaged"
+            path.unlink(missing_ok=True)  # ext4 waits for the disk where a file is cut to nothing and written anew
             path.write_bytes(content)
             started = cpu_seconds()
             try:
