@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <condition_variable>
 #include <exception>
 #include <limits>
 #include <mutex>
@@ -201,24 +202,27 @@ StallWatch::StallWatch(const Communicator& communicator, double limit_minutes, O
   first_note = notes;
   set_text(set_text({}));
   (*my_note).ticked_ns = now_ns();
-  thread_ = std::thread([this] { watch(); });
+  thread_ = std::jthread([this](const std::stop_token& is_over) { watch(is_over); });
 }
 
 StallWatch::~StallWatch() {
-  is_over_ = true;
+  thread_.request_stop();
   thread_.join();
   my_note = &own_note;
   first_note = &own_note;
 }
 
-void StallWatch::watch() {
+void StallWatch::watch(const std::stop_token& is_over) {
   constexpr std::int64_t kShortestTickNs = 10'000'000;
-  constexpr std::int64_t kLongestTickNs = 200'000'000;  // a program that ends waits so long
-  const std::int64_t tick_ns = std::clamp(limit_ns_ / 20, kShortestTickNs, kLongestTickNs);
+  constexpr std::int64_t kLongestTickNs = 200'000'000;
+  const std::chrono::nanoseconds to_tick(
+      std::clamp(limit_ns_ / 20, kShortestTickNs, kLongestTickNs));
   std::int64_t last_tick_ns = now_ns();
   std::int64_t watched_since_ns = last_tick_ns;
-  while (!is_over_) {
-    std::this_thread::sleep_for(std::chrono::nanoseconds(tick_ns));
+  std::mutex own;
+  std::unique_lock lock(own);
+  std::condition_variable_any ended;  // woken by the end: a program does not wait for a tick
+  while (!ended.wait_for(lock, is_over, to_tick, [&] { return is_over.stop_requested(); })) {
     const std::int64_t tick = now_ns();
     // A batch system may stop and continue whole jobs: that time does not count.
     if (tick - last_tick_ns > limit_ns_ / 2) watched_since_ns = tick;

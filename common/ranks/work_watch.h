@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <thread>
 
@@ -99,7 +100,7 @@ class StallWatch {
  private:
   struct Board;
   struct Stuck;
-  void watch();
+  void watch(const std::stop_token& is_over);
   [[nodiscard]] std::optional<Stuck> longest_stuck(std::int64_t now,
                                                    std::int64_t watched_since_ns) const;
   [[nodiscard]] std::int64_t all_wait_ns(std::int64_t now, std::int64_t watched_since_ns) const;
@@ -108,8 +109,7 @@ class StallWatch {
   std::unique_ptr<Board> board_;
   std::int64_t limit_ns_;
   OnStall on_stall_;
-  std::atomic<bool> is_over_ = false;
-  std::thread thread_;
+  std::jthread thread_;
 };
 
 }  // namespace af
