@@ -91,7 +91,7 @@ class EvaluateStops : public test::EvaluatedStudy {
   }
   static std::string arguments(const std::string& folder) {
     return "registration --study " + path("study.toml") + fields() +
-           "--preset paper --starts-per-interval 25 -o " + path(folder);
+           "--preset paper --starts-per-interval 10 -o " + path(folder);
   }
   static std::vector<std::string> on_two_ranks(const std::string& folder) {
     return on_ranks(2, arguments(folder) + " --stall-minutes 0.1");
@@ -103,7 +103,7 @@ class EvaluateStops : public test::EvaluatedStudy {
     const test::ProgramRun run = evaluate(arguments(folder), 2);
     EXPECT_EQ(run.exit_code, 0) << run.output;
     EXPECT_THAT(run.output, HasSubstr("goes on after"));
-    EXPECT_EQ(CsvTable::read(path(folder + "/registrations.csv")).row_count(), 200U);
+    EXPECT_EQ(CsvTable::read(path(folder + "/registrations.csv")).row_count(), 80U);
   }
   static constexpr std::chrono::seconds kEndsWithin{300};
 };
@@ -128,7 +128,7 @@ TEST_P(StoppedRegistrations, GoOnOnAnotherRankCount) {
   EXPECT_GT(kept, 0U);
   const test::ProgramRun resumed = evaluate(arguments("cut"), ranks % 3 + 1);
   ASSERT_EQ(resumed.exit_code, 0) << resumed.output;
-  EXPECT_THAT(resumed.output, HasSubstr("goes on after " + std::to_string(kept) + " of 200"));
+  EXPECT_THAT(resumed.output, HasSubstr("goes on after " + std::to_string(kept) + " of 80"));
   EXPECT_EQ(rows_without_seconds("cut"), rows_without_seconds("whole"));
   EXPECT_FALSE(std::filesystem::exists(out + ".progress"));
 }
@@ -145,7 +145,7 @@ TEST_F(EvaluateStops, AStoppedRankIsNamedWithItsStartAndTheJobEnded) {
   // Wherever it was: at a start, or waiting for the other.
   EXPECT_THAT(text("said.txt"),
               testing::ContainsRegex(
-                  "rank [01] on .*(registrations: item [0-9]+ .[0-9]+ of 200.: no progress for|"
+                  "rank [01] on .*(registrations: item [0-9]+ .[0-9]+ of 80.: no progress for|"
                   "is stopped: has not run for)"));
   expect_going_on("stalled");
 }
@@ -166,15 +166,15 @@ TEST_F(EvaluateStops, EveryStageThatTakesLongGoesOnAfterStops) {
                             path("ct.nii.gz") + " --pose-count 40 --split-loss-poses 2 -o ";
   const std::string curves = "similarity-curves --study " + path("study.toml") + fields() +
                              "--half-width-mm 2 --half-width-deg 2 -o ";
-  struct Stage {
+  struct Run {
     std::string arguments;
-    const char* table;
+    std::string name;
+    std::vector<std::string> tables;  // of a stage each
   };
-  for (const auto& [arguments, table] : {Stage{field, "image-quality.csv"},
-                                         Stage{field, "loss-split.csv"},
-                                         Stage{curves, "similarity-curves.csv"}}) {
-    SCOPED_TRACE(table);
-    const std::string name = std::string(table) + "-";
+  for (const auto& [arguments, name, tables] :
+       {Run{field, "field-", {"image-quality.csv", "loss-split.csv"}},
+        Run{curves, "curves-", {"similarity-curves.csv"}}}) {
+    SCOPED_TRACE(name);
     ASSERT_EQ(evaluate(arguments + path(name + "whole")).exit_code, 0);
     const std::string stopped = path(name + "stopped");
     expect_refused(evaluate(arguments + stopped + test::kStopAtOnce, 2), 75, "saved: run the same");
@@ -183,7 +183,8 @@ TEST_F(EvaluateStops, EveryStageThatTakesLongGoesOnAfterStops) {
     const test::ProgramRun last =
         test::run_until_done(AF_PROGRAM_FOLDER "/af-evaluate " + arguments + stopped);
     ASSERT_EQ(last.exit_code, 0) << last.output;
-    EXPECT_EQ(text(name + "stopped/" + table), text(name + "whole/" + table));
+    for (const std::string& table : tables)
+      EXPECT_EQ(text(name + "stopped/" + table), text(name + "whole/" + table)) << table;
     EXPECT_FALSE(std::filesystem::exists(stopped + ".progress"));
   }
 }
