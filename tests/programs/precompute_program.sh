@@ -125,8 +125,10 @@ spacing() {
   grep -q '256 x 256 nodes' out || fail "a wide spacing took nodes away: $(cat out)"
 }
 
+# Of every number of ranks with every size, caster and number of slabs, and with every pair of these: half of the combinations.
 ranks() {
   hashes=()
+  local i odd=0
   for sizes in '9 61' '8 64'; do
     for caster in shear-warp trilinear; do
       for slabs in 1 8; do
@@ -140,9 +142,12 @@ ranks() {
           AF_VECTOR_BITS=$bits "$program" "${options[@]}" -o bits.h5 >bits.txt 2>/dev/null
           [[ $(hash_of bits.txt) == "$expected" ]] || fail "another payload with $bits-bit vectors: ${options[*]}"
         done
-        for ranks in "${rank_counts[@]}"; do same_hash "$ranks" "$expected" "${options[@]}"; done
+        for ((i = odd; i < ${#rank_counts[@]}; i += 2)); do same_hash "${rank_counts[i]}" "$expected" "${options[@]}"; done
+        odd=$((1 - odd))
       done
+      odd=$((1 - odd))
     done
+    odd=$((1 - odd))
   done
   # Where the (s,t) plane stands is an option; camera names may be typed in any case.
   for plane in centre centroid; do
