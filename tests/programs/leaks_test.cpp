@@ -54,15 +54,16 @@ class Leaks : public ::testing::Test {
         options + " -o " + path(name));
     ASSERT_EQ(run.exit_code, 0) << run.output;
   }
-  /// Registers a study from a start a little off the nominal pose; result.json.
+  /// Registers a study, once, from a start a little off the nominal pose; result.json.
   static nlohmann::json registered(const std::string& name) {
-    static int run_count = 0;
-    const std::string output = path(name + "-result-" + std::to_string(++run_count));
-    const test::ProgramRun run = test::run_command(
-        AF_PROGRAM_FOLDER "/af-register --renderer raycast --preset robust --study " +
-        path(name + "/study.toml") +
-        " --start-rotation-deg 1,-1,2 --start-translation-mm 2,-2,3 -o " + output);
-    EXPECT_TRUE(run.exit_code == 0 || run.exit_code == 7) << run.output;
+    const std::string output = path(name + "-result");
+    if (!fs::exists(output)) {
+      const test::ProgramRun run = test::run_command(
+          AF_PROGRAM_FOLDER "/af-register --renderer raycast --preset robust --study " +
+          path(name + "/study.toml") +
+          " --start-rotation-deg 1,-1,2 --start-translation-mm 2,-2,3 -o " + output);
+      EXPECT_TRUE(run.exit_code == 0 || run.exit_code == 7) << run.output;
+    }
     std::ifstream file(output + "/result.json");
     return nlohmann::json::parse(file);
   }
