@@ -103,7 +103,8 @@ class Numbers(unittest.TestCase):
 
 class Pages(Copied):
     def test_show_the_numbers_of_summaries_and_rows(self):
-        summary, text = self.summary("registration"), Page(self.page()).words
+        summary, html_of_page = self.summary("registration"), self.page()
+        text = Page(html_of_page).words
         starts = self.rows("registration/registrations.csv")
         for renderer in summary["renderers"]:
             rows = [row for row in starts if row["renderer"] == renderer["renderer"]]
@@ -124,7 +125,7 @@ class Pages(Copied):
         for setting in self.summary("field-parameters")["settings"]:
             self.assertIn(numbers.three(setting["psnr_db"]["median"]), text)
         for name in ("nan", "NaN", "None", "Undefined"):
-            self.assertNotIn(f">{name}<", self.page())
+            self.assertNotIn(f">{name}<", html_of_page)
 
     def test_begin_with_the_default_method(self):
         other = self.folder / "another"
@@ -254,15 +255,16 @@ class Runs(Copied):
 
 class Program(Copied):
     def test_draws_beside_the_numbers_the_same_bytes_every_time(self):
-        for kind, names in (("registration", ("success-rate", "tre-histogram", "tre-scatter")), ("image-quality", ("psnr",)),
-                            ("field-parameters", ("field-parameters",))):
-            run(self.folder / kind)
-            first = {name: (self.folder / kind / f"{name}.svg").read_bytes() for name in names}
-            run(self.folder / kind)
-            for name in names:
-                self.assertEqual((self.folder / kind / f"{name}.svg").read_bytes(), first[name])
-                self.assertTrue((self.folder / kind / f"{name}.png").read_bytes().startswith(b"\x89PNG"))
-                self.assertFalse(list((self.folder / kind).glob("*.partial")))
+        drawn = {"registration": ("success-rate", "tre-histogram", "tre-scatter"), "image-quality": ("psnr",),
+                 "field-parameters": ("field-parameters",)}
+        of_all = [self.folder / kind / name for kind, names in drawn.items() for name in names]
+        run(*(self.folder / kind for kind in drawn))
+        first = [path.with_suffix(".svg").read_bytes() for path in of_all]
+        run(*(self.folder / kind for kind in drawn))
+        self.assertEqual([path.with_suffix(".svg").read_bytes() for path in of_all], first)
+        for path in of_all:
+            self.assertTrue(path.with_suffix(".png").read_bytes().startswith(b"\x89PNG"))
+            self.assertFalse(list(path.parent.glob("*.partial")))
         rows = self.rows("registration/success-rate.csv")
         self.assertEqual(sum(int(row["starts"]) for row in rows), sum(entry["starts"] for entry in self.summary("registration")["renderers"]))
         self.assertIn("| Run | Succeeded |", run(self.folder / "error-budget"))
@@ -271,9 +273,10 @@ class Program(Copied):
         folder = self.folder / "registration"
         page_of = [sys.executable, "-X", "importtime", str(PROGRAM), str(folder), "-o", str(self.folder / "x.html")]
         for has_figures in (False, True):
+            if has_figures:
+                run(folder)
             done = subprocess.run(page_of, capture_output=True, text=True, check=True)
             self.assertEqual("matplotlib" not in done.stderr, has_figures)
-            run(folder)
 
     def test_refuses_bad_input_in_one_line(self):
         (self.folder / "empty").mkdir()
