@@ -91,7 +91,7 @@ class EvaluateStops : public test::EvaluatedStudy {
   }
   static std::string arguments(const std::string& folder) {
     return "registration --study " + path("study.toml") + fields() +
-           "--preset paper --starts-per-interval 10 -o " + path(folder);
+           "--preset paper --starts-per-interval 10 --no-pictures -o " + path(folder);
   }
   static std::vector<std::string> on_two_ranks(const std::string& folder) {
     return on_ranks(2, arguments(folder) + " --stall-minutes 0.1");

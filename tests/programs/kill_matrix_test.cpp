@@ -156,6 +156,7 @@ class KillMatrix : public testing::Test {
                                "paper",
                                "--starts-per-interval",
                                "25",
+                               "--no-pictures",
                                "-o",
                                folder});
   }
