@@ -67,8 +67,8 @@ evaluate_ranks=2 evaluate_memory=100M evaluate_time=00:10:00
 report_memory=100M report_time=00:05:00
 stop_seconds=5
 most_requeues=3 most_fruitless=3
-precompute_options=(--max-rotation-deg 10 --max-translation-mm 30 --uv-nodes 40 --st-nodes 96 --codewords 2048 --caster trilinear)
-evaluate_options=(--preset paper --starts-per-interval 20)
+precompute_options=(--max-rotation-deg 10 --max-translation-mm 30 --uv-nodes 30 --st-nodes 96 --codewords 2048 --caster trilinear)
+evaluate_options=(--preset paper --starts-per-interval 8)
 TEXT
 
 # Slurm may fail to launch a step, and srun end with 0 all the same: the first evaluation meets that.
