@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Runs the commands of a page, so that a reader can.
 
-Usage: page_commands.py --run PAGE PROGRAMS       runs all ```sh and ```python blocks of a page in one scratch folder
+Usage: page_commands.py --run PAGE PROGRAMS [DATA] runs all ```sh and ```python blocks of a page in one scratch folder
+       page_commands.py --data DATA PROGRAMS      makes the small data of all pages once, in a new folder DATA
        page_commands.py --check ROOT              blocks of every page are of a known kind, those that are not run say
                                                   why, and name options that our programs have
        page_commands.py --pages ROOT              prints the pages that have ```sh blocks
@@ -13,6 +14,7 @@ line behind it begins with "*Not run by the tests:" and gives the reason. So may
 """
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -92,16 +94,28 @@ def script_of(page):
     return "\n".join(parts) + "\n"
 
 
-def run(page, programs):
-    root = HERE.parent.parent
+def environment_of(programs):
+    environment = dict(os.environ)
+    environment["PATH"] = f"{programs}:{environment['PATH']}"
+    environment["PYTHONPATH"] = str(programs.parent / "python")
+    environment["OMPI_ALLOW_RUN_AS_ROOT"] = environment["OMPI_ALLOW_RUN_AS_ROOT_CONFIRM"] = "1"
+    environment["OMPI_MCA_rmaps_base_oversubscribe"] = "1"
+    return environment
+
+
+def make_data(folder, programs):
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    return subprocess.run([HERE / "small_data.py", folder], check=False, env=environment_of(programs)).returncode
+
+
+def run(page, programs, data=None):
+    root, environment = HERE.parent.parent, environment_of(programs)
     with tempfile.TemporaryDirectory(prefix="page ") as folder:
+        if data:
+            shutil.copytree(data, folder, dirs_exist_ok=True)
         for name in ("jobs", "tests", "docs", "common"):
             (Path(folder) / name).symlink_to(root / name)
-        environment = dict(os.environ)
-        environment["PATH"] = f"{programs}:{environment['PATH']}"
-        environment["PYTHONPATH"] = str(programs.parent / "python")
-        environment["OMPI_ALLOW_RUN_AS_ROOT"] = environment["OMPI_ALLOW_RUN_AS_ROOT_CONFIRM"] = "1"
-        environment["OMPI_MCA_rmaps_base_oversubscribe"] = "1"
         script = script_of(page)
         wanted = [word for word in ("cam01.txt", "results/") if f" {word}" in script]
         subprocess.run([HERE / "small_data.py", folder, *wanted], check=True, env=environment, cwd=folder)
@@ -110,8 +124,10 @@ def run(page, programs):
 
 def main():
     arguments = sys.argv[1:]
-    if len(arguments) == 3 and arguments[0] == "--run":
-        return run(Path(arguments[1]), Path(arguments[2]).resolve())
+    if len(arguments) in (3, 4) and arguments[0] == "--run":
+        return run(Path(arguments[1]), Path(arguments[2]).resolve(), *arguments[3:])
+    if len(arguments) == 3 and arguments[0] == "--data":
+        return make_data(Path(arguments[1]).resolve(), Path(arguments[2]).resolve())
     if len(arguments) == 2 and arguments[0] == "--check":
         return check(Path(arguments[1]))
     if len(arguments) == 2 and arguments[0] == "--pages":

@@ -5,8 +5,8 @@
 Usage: small_data.py FOLDER [cam01.txt] [results/]
 
 They are the study that af-simulate, which must be on the PATH, makes of its phantom of a spine, for the cameras of the
-shipped C-arm, here called A and B. On demand also the cameras as MayaCam's files cam01.txt and cam02.txt, and the
-results of a registration of the study.
+shipped C-arm, here called A and B; what is there already stays. On demand also the cameras as MayaCam's files cam01.txt
+and cam02.txt, and the results of a registration of the study.
 """
 import shutil
 import subprocess
@@ -21,10 +21,7 @@ def output_of(*command, folder):
     return run.stdout
 
 
-def main():
-    if len(sys.argv) < 2:
-        sys.exit(__doc__)
-    folder, wanted = Path(sys.argv[1]), sys.argv[2:]
+def make_study(folder):
     rig = output_of("af-inspect", "--template", "rig", folder=folder)
     (folder / "rig.toml").write_text(rig.replace('"AP"', '"A"').replace('"LAT"', '"B"'))
     output_of("af-simulate", "--phantom", "spine", "--rig", "rig.toml", "--seed", "1", "--case", "patient-01", "-o", "made",
@@ -33,6 +30,14 @@ def main():
         if file.name != "rig.toml":
             shutil.move(file, folder / file.name)
     shutil.rmtree(folder / "made")
+
+
+def main():
+    if len(sys.argv) < 2:
+        sys.exit(__doc__)
+    folder, wanted = Path(sys.argv[1]), sys.argv[2:]
+    if not (folder / "study.toml").exists():
+        make_study(folder)
     if "cam01.txt" in wanted:
         output_of("af-convert", "rig.toml", "--to", "mayacam2", "-o", "cam.txt", folder=folder)
         for name, number in (("A", "01"), ("B", "02")):
