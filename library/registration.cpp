@@ -12,6 +12,7 @@
 #include "base/thread_pool.h"
 #include "geometry/target_box.h"
 #include "geometry/tre.h"
+#include "library/field_facts.h"
 #include "library/translation.h"
 #include "register/case_loading.h"
 #include "register/method/method_options.h"
@@ -213,6 +214,10 @@ RegistrationCase RegistrationCase::load(const std::filesystem::path& study_path,
     const auto pool = std::make_shared<af::ThreadPool>(af::thread_count(options.threads));
     registration::CaseLoadOptions loading = load_options(options, method, pool);
     loading.beam = library::checked_beam(beam);
+    for (const auto& [camera, field] : options.opened_fields) {
+      loading.opened_fields[camera] = field.facts_->opened;
+      loading.field_paths[camera] = field.facts_->opened->path();
+    }
     auto impl = std::make_shared<Impl>();
     impl->study = af::read_study(study_path, &impl->warnings);
     const af::Study& study = impl->study;

@@ -18,6 +18,7 @@
 #include "drr/ray_cast_drr.h"
 #include "drr/xray_beam.h"
 #include "library/ct_impl.h"
+#include "library/field_facts.h"
 #include "library/translation.h"
 #include "study/pose_file.h"
 
@@ -285,16 +286,6 @@ std::shared_ptr<const af::DrrRenderer> renderer_of(const af::OpenedField& opened
 
 }  // namespace
 
-struct Field::Facts {
-  std::string look_up;
-  int members = 1;
-  double max_rotation_deg = 0.0;
-  double max_translation_mm = 0.0;
-  af::CtIdentity ct;
-  std::string payload_sha256;
-  double water_mu_per_mm = 0.0;
-};
-
 Field::Field(std::shared_ptr<const Impl> impl, std::shared_ptr<const Facts> facts)
     : Renderer(std::move(impl)), facts_(std::move(facts)) {}
 
@@ -308,9 +299,10 @@ Field Field::open(const std::filesystem::path& path,
   return library::translated_reading([&] {
     const auto pool = pool_of(options.threads);
     const af::XrayBeamOptions beam_options = library::checked_beam(beam);
-    const af::OpenedField opened(path, af::Communicator::alone());
-    const af::FieldIdentity& identity = opened.identity();
     auto facts = std::make_shared<Facts>();
+    facts->opened = std::make_shared<const af::OpenedField>(path, af::Communicator::alone());
+    const af::OpenedField& opened = *facts->opened;
+    const af::FieldIdentity& identity = opened.identity();
     facts->look_up = options.look_up.empty() ? opened.info().look_up : options.look_up;
     facts->members = static_cast<int>(opened.coverage().planes.size());
     const af::MotionRange within = identity.range.symmetric_part();

@@ -235,35 +235,21 @@ std::string limit_to_rays(const OpenedField& opened,
   return reach.distance + "; " + reach.text(camera.name);
 }
 
-/// Collective. The field of a view with its renderers, kept from the case before or opened, and
-/// checked against the case.
-std::shared_ptr<const FieldInUse> field_of_view(const std::string& path,
-                                                const StudyCase& study_case,
-                                                const CaseLoadOptions& options,
-                                                const std::optional<CtFacts>& ct,
-                                                const RegistrationProblem& problem,
-                                                const View& view,
-                                                const Communicator& communicator) {
-  const auto require_of_case = [&](const OpenedField& opened) {
-    all_or_none(communicator, [&] { require_field_of_case(opened, study_case, options, ct); });
-  };
-  std::shared_ptr<const FieldInUse> field =
-      options.kept_fields ? options.kept_fields->find(path) : nullptr;
-  if (field) {
-    require_of_case(field->opened);
-  } else {
-    OpenedField opened(path, communicator);
-    require_of_case(opened);
-    std::optional<OpenedField> bone;
-    if (options.beam.needs_bone()) bone = opened.bone(communicator);
-    FieldRenderers renderers =
-        field_renderers(opened, bone, problem.frame(), view, options, communicator);
-    std::optional<std::string> bone_sha256;
-    if (bone) bone_sha256 = bone->info().payload_sha256;
-    field = std::make_shared<const FieldInUse>(
-        FieldInUse{std::move(opened), std::move(bone_sha256), std::move(renderers)});
-  }
-  if (options.kept_fields && !field->opened.atlas()) options.kept_fields->add(path, field);
+/// Collective. The field of a view, open already or opened, and checked against the case.
+std::shared_ptr<const OpenedField> field_of_view(const std::string& path,
+                                                 const std::string& camera,
+                                                 const StudyCase& study_case,
+                                                 const CaseLoadOptions& options,
+                                                 const std::optional<CtFacts>& ct,
+                                                 const Communicator& communicator) {
+  std::shared_ptr<const OpenedField> field;
+  if (const auto given = options.opened_fields.find(camera); given != options.opened_fields.end())
+    field = given->second;
+  else if (options.kept_fields)
+    field = options.kept_fields->find(path);
+  if (!field) field = std::make_shared<const OpenedField>(path, communicator);
+  all_or_none(communicator, [&] { require_field_of_case(*field, study_case, options, ct); });
+  if (options.kept_fields) options.kept_fields->add(path, field);
   return field;
 }
 
@@ -281,24 +267,30 @@ void use_fields(const StudyCase& study_case,
       return field_path_of(study_case, study_case.views[i], options).string();
     });
     const bool is_of_study = options.field_paths.count(view.view.camera.name) == 0;
-    const std::shared_ptr<const FieldInUse> field =
+    std::optional<OpenedField> bone;
+    FieldRenderers renderers;
+    const std::shared_ptr<const OpenedField> field =
         naming_study_line(is_of_study ? study_case.views[i].places : StudyPlaces(), "field", [&] {
-          return field_of_view(path, study_case, options, ct, problem, view.view, communicator);
+          auto opened =
+              field_of_view(path, view.view.camera.name, study_case, options, ct, communicator);
+          if (options.beam.needs_bone()) bone = opened->bone(communicator);
+          renderers =
+              field_renderers(*opened, bone, problem.frame(), view.view, options, communicator);
+          return opened;
         });
-    const CtIdentity& of_field = field->opened.identity().ct;
+    const CtIdentity& of_field = field->identity().ct;
     if (i == 0) of_first_field = of_field;
     all_or_none(communicator, [&] {
       require_same_ct(path, of_first_field, "that of the first field", of_field);
     });
     const std::string name = "field " + view.view.camera.name;
-    if (field->bone_sha256) loaded.inputs["bone " + name] = *field->bone_sha256;
-    const FieldRenderers& renderers = field->renderers;
+    if (bone) loaded.inputs["bone " + name] = bone->info().payload_sha256;
     view.renderer = renderers.levels.front();
     for (std::size_t level = 0; level < renderers.blur_sigma_mm.size(); ++level)
       view.coarse_levels.push_back({renderers.levels[level + 1], renderers.blur_sigma_mm[level]});
-    loaded.input_notes[name] = limit_to_rays(field->opened, problem, communicator, view) +
+    loaded.input_notes[name] = limit_to_rays(*field, problem, communicator, view) +
                                "; level 0 is looked up by " + renderers.look_up;
-    loaded.inputs[name] = field->opened.info().payload_sha256;
+    loaded.inputs[name] = field->info().payload_sha256;
   }
 }
 

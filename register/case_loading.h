@@ -11,6 +11,7 @@
 
 #include "base/thread_pool.h"
 #include "ct/ray_caster.h"
+#include "drr/opened_field.h"
 #include "drr/xray_beam.h"
 #include "ranks/communicator.h"
 #include "ranks/input_identity.h"
@@ -53,6 +54,8 @@ struct CaseLoadOptions {
   std::vector<int> correction_levels;
   /// Threads that make the levels together; none: only the calling thread.
   std::shared_ptr<ThreadPool> pool = nullptr;
+  /// camera -> field that is open already: the one at field_paths.
+  std::map<std::string, std::shared_ptr<const OpenedField>> opened_fields;
   /// Fields that the case before left open; none: every case opens its own.
   std::shared_ptr<KeptFields> kept_fields = nullptr;
 };

@@ -71,6 +71,25 @@ bool pays_to_decode(const CompressedAttenuationField& field) {
          (field.slabs.size() > 1 && decoded_bytes(field) <= kMostDecodedBytes);
 }
 
+/// Collective where the memory is. Adds to a field's samples what they lack: level 0, where it pays
+/// to decode that, and levels 1 ... halvings of its pyramid (stepping_stones:
+/// make_field_pyramid()).
+void complete(const std::shared_ptr<const CompressedAttenuationField>& field,
+              int halvings,
+              int stepping_stones,
+              const FieldLevelMemory& memory,
+              FieldSamples& samples) {
+  if (!samples.level_0 && pays_to_decode(*field))
+    samples.level_0 = std::make_shared<const FieldLevel>(decode_field(field, memory));
+  FieldLevels& pyramid = samples.pyramid;
+  if (pyramid.empty() && halvings > 0)
+    pyramid = samples.level_0
+                  ? make_field_pyramid(samples.level_0, halvings, memory, stepping_stones)
+                  : make_field_pyramid(field, halvings, memory, stepping_stones);
+  while (static_cast<int>(pyramid.size()) < halvings)
+    pyramid.push_back(std::make_shared<const FieldLevel>(next_field_level(pyramid.back(), memory)));
+}
+
 /// Collective where the memory is. A field's renderers for a view: its own, and those of so many
 /// levels of its pyramid. A method's levels are those of a field of about 256 nodes: a finer field
 /// begins with more halvings, so that a level has about the same blur. The field itself is looked
@@ -81,24 +100,20 @@ FieldRenderers renderers_of(const std::shared_ptr<const CompressedAttenuationFie
                             int levels,
                             const std::shared_ptr<ThreadPool>& pool,
                             const std::shared_ptr<ThreadPool>& coarse_pool,
-                            const FieldLevelMemory& memory) {
+                            const FieldLevelMemory& memory,
+                            FieldSamples& samples) {
   const int more_halvings = halvings_to_usual_nodes(field->light_slab);
   const int halvings = levels > 0 ? levels + more_halvings : 0;
   FieldRenderers made;
   made.look_up = look_up_of_searches(look_up, field->slabs.size());
-  FieldLevels pyramid;
-  if (pays_to_decode(*field)) {
-    const auto samples = std::make_shared<const FieldLevel>(decode_field(field, memory));
-    made.levels.push_back(make_field_renderer(samples, made.look_up, pool));
-    if (halvings > 0) pyramid = make_field_pyramid(samples, halvings, memory, more_halvings);
-  } else {
-    made.levels.push_back(make_field_renderer(field, made.look_up, pool));
-    if (halvings > 0) pyramid = make_field_pyramid(field, halvings, memory, more_halvings);
-  }
-  for (auto i = static_cast<std::size_t>(more_halvings); i < pyramid.size(); ++i) {
+  complete(field, halvings, more_halvings, memory, samples);
+  made.levels.push_back(samples.level_0 ? make_field_renderer(samples.level_0, made.look_up, pool)
+                                        : make_field_renderer(field, made.look_up, pool));
+  for (int i = more_halvings; i < halvings; ++i) {
+    const auto& level = samples.pyramid[static_cast<std::size_t>(i)];
     made.levels.push_back(
-        std::make_shared<const TwoPassAfDrr>(pyramid[i], TwoPassOptions{}, coarse_pool));
-    made.blur_sigma_mm.push_back(pyramid[i]->blur_sigma_mm(true));
+        std::make_shared<const TwoPassAfDrr>(level, TwoPassOptions{}, coarse_pool));
+    made.blur_sigma_mm.push_back(level->blur_sigma_mm(true));
   }
   return made;
 }
@@ -165,25 +180,29 @@ FieldRenderers renderers_of_atlas(const OpenedField& opened,
   const std::vector<std::uint64_t> near =
       on_root(communicator, [&] { return members_in_reach(opened, nominal, view); }).share();
   const auto open = [opened, levels, threads](std::size_t member) {
+    FieldSamples samples;
     return std::make_shared<const MemberLevels>(
         renderers_of(opened.member(member, Communicator::alone()),
                      opened.info().look_up,
                      levels,
                      threads.own,
                      threads.coarse,
-                     process_memory())
+                     process_memory(),
+                     samples)
             .levels);
   };
   const auto members =
       std::make_shared<MembersInUse>(open, near.size() + OpenedField::kMembersKept);
   FieldRenderers set;
   for (const std::uint64_t i : near) {
+    FieldSamples samples;
     const FieldRenderers made = renderers_of(opened.member(i, communicator),
                                              opened.info().look_up,
                                              levels,
                                              threads.own,
                                              threads.coarse,
-                                             node_memory(communicator));
+                                             node_memory(communicator),
+                                             samples);
     members->keep(i, std::make_shared<const MemberLevels>(made.levels));
     if (set.blur_sigma_mm.empty()) set.blur_sigma_mm = made.blur_sigma_mm;
     set.look_up = made.look_up;
@@ -279,7 +298,8 @@ FieldRenderers field_renderers(const OpenedField& opened,
                         levels,
                         threads.own,
                         threads.coarse,
-                        node_memory(communicator));
+                        node_memory(communicator),
+                        of.samples());
   };
   FieldRenderers all = renderers(opened);
   FieldRenderers of_bone;

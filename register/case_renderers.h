@@ -55,7 +55,7 @@ struct FieldRenderers {
 /// held once per node. With `bone` they render the tube's spectrum, at the levels that both fields
 /// have, with the blurs of the field of all. Atlas members that poses near the nominal one need are
 /// held once per node; each rank opens others itself when a search goes farther. A field's
-/// renderers depend on neither the pose nor the view.
+/// samples stay with it (OpenedField::samples()).
 FieldRenderers field_renderers(const OpenedField& opened,
                                const std::optional<OpenedField>& bone,
                                const PoseFrame& nominal,

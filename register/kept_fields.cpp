@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "register/kept_fields.h"
 
-#include <utility>
-
 namespace af::registration {
 namespace {
 
@@ -15,8 +13,7 @@ std::set<std::string> field_paths(const StudyCase& study_case) {
 
 }  // namespace
 
-KeptFields::KeptFields(std::span<const StudyCase> cases, std::shared_ptr<ThreadPool> pool)
-    : pool_(std::move(pool)) {
+KeptFields::KeptFields(std::span<const StudyCase> cases) {
   for (const StudyCase& study_case : cases)
     for (const std::string& path : field_paths(study_case)) ++cases_left_[path];
 }
@@ -27,12 +24,12 @@ void KeptFields::begin_case(const StudyCase& study_case) {
   std::erase_if(fields_, [&](const auto& kept) { return used.count(kept.first) == 0; });
 }
 
-std::shared_ptr<const FieldInUse> KeptFields::find(const std::string& path) const {
+std::shared_ptr<const OpenedField> KeptFields::find(const std::string& path) const {
   const auto found = fields_.find(path);
   return found == fields_.end() ? nullptr : found->second;
 }
 
-void KeptFields::add(const std::string& path, const std::shared_ptr<const FieldInUse>& field) {
+void KeptFields::add(const std::string& path, const std::shared_ptr<const OpenedField>& field) {
   const auto left = cases_left_.find(path);
   const bool is_used_later = left != cases_left_.end() && left->second > 0;
   if (is_used_later)

@@ -34,6 +34,7 @@ std::size_t OpenedField::codewords() const {
 }
 
 OpenedField OpenedField::bone(const Communicator& communicator) const {
+  if (shared_->bone) return *shared_->bone;
   const std::filesystem::path path = bone_field_path(path_);
   all_or_none(communicator, [&] {
     if (!std::filesystem::exists(path))
@@ -44,7 +45,8 @@ OpenedField OpenedField::bone(const Communicator& communicator) const {
   });
   OpenedField opened(path, communicator, Materials::Any);
   all_or_none(communicator, [&] { require_bone_of(identity(), opened.identity(), path); });
-  return opened;
+  shared_->bone = std::make_unique<const OpenedField>(std::move(opened));
+  return *shared_->bone;
 }
 
 std::shared_ptr<const CompressedAttenuationField> OpenedField::member(

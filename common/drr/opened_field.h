@@ -12,12 +12,20 @@
 #include "drr/atlas_renderers.h"
 #include "drr/drr_renderer.h"
 #include "drr/field_coverage.h"
+#include "drr/field_level.h"
 #include "field/field_file.h"
 #include "ranks/communicator.h"
 
 namespace af {
 
-/// A field with its indices, or an atlas whose members are read when they are needed.
+/// What is looked up in a field besides its codewords.
+struct FieldSamples {
+  std::shared_ptr<const FieldLevel> level_0;  ///< null: by codewords
+  FieldLevels pyramid;                        ///< levels 1, ...
+};
+
+/// A field with its indices, or an atlas whose members are read when they are needed. Copies share
+/// everything.
 class OpenedField {
  public:
   enum class Materials { All, Any };
@@ -44,9 +52,13 @@ class OpenedField {
   [[nodiscard]] const FieldCoverage& coverage() const { return coverage_; }
   [[nodiscard]] std::size_t codewords() const;
 
-  /// Collective. The field or atlas of the CT's bone beside it, for DRRs of a tube's spectrum. The
-  /// two need not be cut alike. FileError where there is none that belongs to it.
+  /// Collective, for one thread at a time. The field or atlas of the CT's bone beside it, for DRRs
+  /// of a tube's spectrum; opened once. The two need not be cut alike. FileError where there is
+  /// none that belongs to it.
   [[nodiscard]] OpenedField bone(const Communicator& communicator) const;
+
+  /// Of a field: the samples that its users have made so far, for one thread at a time.
+  [[nodiscard]] FieldSamples& samples() const { return shared_->samples; }
 
   /// Collective for a communicator of ranks. A member of an atlas.
   [[nodiscard]] std::shared_ptr<const CompressedAttenuationField> member(
@@ -69,6 +81,11 @@ class OpenedField {
   std::shared_ptr<const CompressedAttenuationField> field_;
   std::shared_ptr<const AttenuationAtlas> atlas_;
   FieldCoverage coverage_;
+  struct Shared {
+    std::unique_ptr<const OpenedField> bone;
+    FieldSamples samples;
+  };
+  std::shared_ptr<Shared> shared_ = std::make_shared<Shared>();
 };
 
 }  // namespace af

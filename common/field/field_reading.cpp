@@ -51,25 +51,35 @@ void read_indices(const std::filesystem::path& path,
   if (!found.empty()) throw FileError(path.string(), found.front());
 }
 
-/// Collective. The indices of one slab, held once per node; rank 0 reads them for all.
-CompressedSlab read_slab(const std::filesystem::path& path,
-                         const DatasetRule& rule,
-                         const std::string& sha256,
-                         const Codebook& codebook,
-                         const Communicator& communicator) {
-  const std::size_t tiles = rule.value_count();
-  const auto memory = communicator.allocate_on_nodes_from_root(
-      tiles * sizeof(std::uint16_t), [&](std::span<std::byte> bytes) {
+/// Collective. The indices of all slabs, held once per node. Rank 0's node reads them for all: its
+/// ranks take the slabs in turn, since to unpack them is most of the work of opening a field.
+std::vector<CompressedSlab> read_slabs(const FieldHeader& header,
+                                       const std::filesystem::path& path,
+                                       const Codebook& codebook,
+                                       const Communicator& communicator) {
+  constexpr std::size_t kAligned = Communicator::kNodeMemoryAlignment / sizeof(std::uint16_t);
+  std::vector<std::size_t> begins{0};
+  for (const DatasetRule& rule : header.index_rules)
+    begins.push_back((begins.back() + rule.value_count() + kAligned - 1) / kAligned * kAligned);
+  const auto memory = communicator.allocate_on_nodes_from_root_together(
+      begins.back() * sizeof(std::uint16_t), [&](std::span<std::byte> bytes, int part, int parts) {
+        auto* const values = reinterpret_cast<std::uint16_t*>(bytes.data());
         naming_file(path, [&] {
-          read_indices(path,
-                       rule,
-                       sha256,
-                       codebook,
-                       {reinterpret_cast<std::uint16_t*>(bytes.data()), tiles});
+          for (auto k = static_cast<std::size_t>(part); k < header.index_rules.size();
+               k += static_cast<std::size_t>(parts))
+            read_indices(path,
+                         header.index_rules[k],
+                         header.index_sha256[k],
+                         codebook,
+                         {values + begins[k], header.index_rules[k].value_count()});
         });
       });
-  const auto* first = reinterpret_cast<const std::uint16_t*>(memory.get());
-  return {SharedArray<std::uint16_t>(memory, {first, tiles})};
+  const auto* const values = reinterpret_cast<const std::uint16_t*>(memory.get());
+  std::vector<CompressedSlab> slabs;
+  for (std::size_t k = 0; k < header.index_rules.size(); ++k)
+    slabs.push_back({SharedArray<std::uint16_t>(
+        memory, {values + begins[k], header.index_rules[k].value_count()})});
+  return slabs;
 }
 
 /// Collective. A field of a file with its indices.
@@ -78,11 +88,7 @@ std::shared_ptr<const CompressedAttenuationField> field_with_indices(
     const std::filesystem::path& path,
     const Communicator& communicator) {
   auto field = std::make_shared<CompressedAttenuationField>(header.field(path.string()));
-  for (std::size_t k = 0; k < header.index_rules.size(); ++k)
-    field->slabs.push_back(all_or_none(communicator, [&] {
-      return read_slab(
-          path, header.index_rules[k], header.index_sha256[k], field->codebook, communicator);
-    }));
+  field->slabs = read_slabs(header, path, field->codebook, communicator);
   do_on_root(communicator, [&] {
     const auto found = problems(*field);
     if (!found.empty()) throw FileError(path.string(), found.front());

@@ -267,17 +267,25 @@ std::shared_ptr<const std::byte> Communicator::allocate_on_node_together(
 
 std::shared_ptr<const std::byte> Communicator::allocate_on_nodes_from_root(
     std::size_t bytes, const std::function<void(std::span<std::byte>)>& fill) const {
-  if (is_alone(impl_->handle)) return allocate_on_node(bytes, fill);
-  std::span<std::byte> memory;
-  bool is_first_of_node = false;
-  auto owner =
-      allocate_on_node_together(bytes, [&](std::span<std::byte> on_node, int part, int /*parts*/) {
-        memory = on_node;
-        is_first_of_node = part == 0;
-      });
+  return allocate_on_nodes_from_root_together(bytes,
+                                              [&](std::span<std::byte> memory, int part, int) {
+                                                if (part == 0) fill(memory);
+                                              });
+}
+
+std::shared_ptr<const std::byte> Communicator::allocate_on_nodes_from_root_together(
+    std::size_t bytes,
+    const std::function<void(std::span<std::byte>, int part, int parts)>& fill) const {
+  if (is_alone(impl_->handle)) return allocate_on_node_together(bytes, fill);
+  const Communicator on_node = node();
+  std::array<std::uint64_t, 1> is_roots_node{is_root() ? std::uint64_t{1} : std::uint64_t{0}};
+  on_node.maximum(is_roots_node);
+  auto owner = allocate_on_node(bytes);
+  const std::span<std::byte> memory(owner.get(), bytes);
   all_or_none(*this, [&] {
-    if (is_root()) fill(memory);
+    if (is_roots_node[0] != 0) fill(memory, on_node.rank(), on_node.size());
   });
+  const bool is_first_of_node = on_node.is_root();
   MPI_Comm first_ranks = MPI_COMM_NULL;
   require_success(
       MPI_Comm_split(impl_->handle, is_first_of_node ? 0 : MPI_UNDEFINED, rank(), &first_ranks),

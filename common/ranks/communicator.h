@@ -66,6 +66,11 @@ class Communicator {
   /// be read twice. An exception in `fill` is thrown on every rank.
   [[nodiscard]] std::shared_ptr<const std::byte> allocate_on_nodes_from_root(
       std::size_t bytes, const std::function<void(std::span<std::byte>)>& fill) const;
+  /// Collective. The same, filled by the ranks of rank 0's node together, as
+  /// allocate_on_node_together() has them.
+  [[nodiscard]] std::shared_ptr<const std::byte> allocate_on_nodes_from_root_together(
+      std::size_t bytes,
+      const std::function<void(std::span<std::byte>, int part, int parts)>& fill) const;
 
   struct Impl;
   [[nodiscard]] const Impl& impl() const { return *impl_; }

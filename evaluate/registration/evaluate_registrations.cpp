@@ -467,8 +467,7 @@ void run_registration(const RegistrationStudyOptions& options,
   std::vector<RegistrationRow> rows;
   std::size_t start_count = 0;
   std::vector<CaseEvaluation> evaluations;
-  const auto kept_fields = std::make_shared<registration::KeptFields>(
-      cases, std::make_shared<ThreadPool>(thread_count(options.method.threads)));
+  const auto kept_fields = std::make_shared<registration::KeptFields>(cases);
   for (const StudyCase& study_case : cases) {
     const auto on_starts = [&](const CaseEvaluation& so_far) {
       start_count += so_far.starts.starts.size();

@@ -50,9 +50,7 @@ std::vector<LoadedMethod> load_methods(
   std::vector<LoadedMethod> methods;
   const registration::RegistrationOptions method =
       all_or_none(world, [&] { return registration::resolve(options.method); });
-  const auto pool = kept_fields
-                        ? kept_fields->pool()
-                        : std::make_shared<ThreadPool>(thread_count(options.method.threads));
+  const auto pool = std::make_shared<ThreadPool>(thread_count(options.method.threads));
   // Ray casting after a field takes the blurs of the field's levels, so that both run the same
   // method.
   std::vector<double> blurs_mm;

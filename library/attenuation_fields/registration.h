@@ -15,6 +15,7 @@
 #include "attenuation_fields/beam.h"
 #include "attenuation_fields/export.h"
 #include "attenuation_fields/geometry.h"
+#include "attenuation_fields/renderer.h"
 
 namespace attenuation_fields {
 
@@ -27,9 +28,14 @@ struct RegistrationOptions {
   std::string preset = {};                                   ///< empty: robust
   std::string renderer = "field";                            ///< "field" or "raycast"
   std::map<std::string, std::filesystem::path> fields = {};  ///< camera -> field, over the study's
-  std::vector<std::string> chains = {};                      ///< replace the preset's chains
-  std::optional<std::string> similarity = {};                ///< of every stage
-  std::optional<std::string> optimizer = {};                 ///< of every stage
+  /// camera -> field that is open already, over `fields`. Cases share what registration needs of
+  /// it: it is neither read nor decoded again, whatever becomes of its file, and keeps what was
+  /// decoded. An atlas's members are read again, and only of the file that was opened. Its look-up,
+  /// camera, threads and beam are of its own DRRs alone.
+  std::map<std::string, Field> opened_fields = {};
+  std::vector<std::string> chains = {};        ///< replace the preset's chains
+  std::optional<std::string> similarity = {};  ///< of every stage
+  std::optional<std::string> optimizer = {};   ///< of every stage
   std::optional<int> max_evaluations = {};
   bool correct = false;             ///< corrects the end by ray casting
   bool skip_ct_check = false;       ///< with fields: the CT is not read

@@ -117,6 +117,7 @@ class ATTENUATION_FIELDS_API Field : public Renderer {
   [[nodiscard]] double water_mu_per_mm() const;
 
  private:
+  friend class RegistrationCase;
   struct Facts;
   Field(std::shared_ptr<const Impl> impl, std::shared_ptr<const Facts> facts);
   std::shared_ptr<const Facts> facts_;

@@ -245,7 +245,7 @@ class RegistrationCase:
         *,
         preset: str = ...,
         renderer: str = ...,
-        fields: Mapping[str, _Path] = ...,
+        fields: Mapping[str, Union[_Path, Field]] = ...,
         chains: Sequence[str] = ...,
         similarity: Optional[str] = ...,
         optimizer: Optional[str] = ...,

@@ -11,6 +11,7 @@
 #include <string>
 #include <type_traits>
 #include <utility>
+#include <variant>
 
 #include "attenuation_fields/errors.h"
 #include "python/bindings/arrays.h"
@@ -69,17 +70,20 @@ struct MadeBy : Base {
 inline py::object kept_argument(const std::filesystem::path& path) {
   return py::cast(std::filesystem::absolute(path));
 }
-inline py::object kept_argument(const std::map<std::string, std::filesystem::path>& paths) {
-  std::map<std::string, std::filesystem::path> absolute;
-  for (const auto& [name, path] : paths) absolute[name] = std::filesystem::absolute(path);
-  return py::cast(absolute);
-}
 inline py::object kept_argument(const Numbers& numbers) {
   return numbers.given;
 }
 template <typename Value>
 py::object kept_argument(const Value& value) {
   return py::cast(value);
+}
+template <typename Other>
+py::object kept_argument(
+    const std::map<std::string, std::variant<std::filesystem::path, Other>>& by_name) {
+  py::dict kept;
+  for (const auto& [name, value] : by_name)
+    kept[py::str(name)] = std::visit([](const auto& one) { return kept_argument(one); }, value);
+  return kept;
 }
 
 /// `make`, which also keeps its arguments by these names.

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
+#include <variant>
 
 #include "python/bindings/arrays.h"
 #include "python/bindings/pickled.h"
@@ -154,11 +155,14 @@ void set_xrays(PythonCase& self, const std::map<std::string, Numbers>& xrays) {
   warn_of(warnings);
 }
 
+/// Where fields are, or fields that are open.
+using PythonFields = std::map<std::string, std::variant<std::filesystem::path, MadeBy<Field>>>;
+
 RegistrationCase load(const std::filesystem::path& study,
                       const std::string& case_name,
                       const std::string& preset,
                       const std::string& renderer,
-                      const std::map<std::string, std::filesystem::path>& fields,
+                      const PythonFields& fields,
                       const std::vector<std::string>& chains,
                       const std::optional<std::string>& similarity,
                       const std::optional<std::string>& optimizer,
@@ -178,7 +182,12 @@ RegistrationCase load(const std::filesystem::path& study,
   RegistrationOptions options;
   options.preset = preset;
   options.renderer = renderer;
-  options.fields = fields;
+  for (const auto& [camera, field] : fields) {
+    if (const auto* path = std::get_if<std::filesystem::path>(&field))
+      options.fields[camera] = *path;
+    else
+      options.opened_fields.emplace(camera, std::get<MadeBy<Field>>(field));
+  }
   options.chains = chains;
   options.similarity = similarity;
   options.optimizer = optimizer;
@@ -244,7 +253,7 @@ void bind_case(py::module_& module) {
                                py::kw_only(),
                                "preset"_a = "",
                                "renderer"_a = "field",
-                               "fields"_a = std::map<std::string, std::filesystem::path>{},
+                               "fields"_a = PythonFields{},
                                "chains"_a = std::vector<std::string>{},
                                "similarity"_a = py::none(),
                                "optimizer"_a = py::none(),
@@ -261,7 +270,9 @@ void bind_case(py::module_& module) {
                                "tube_kvp"_a = Beam{}.tube_kvp,
                                "aluminium_mm"_a = Beam{}.aluminium_mm,
                                "scatter_to_primary"_a = Beam{}.scatter_to_primary,
-                               "As af-register, but casts rays only if renderer says so.");
+                               "As af-register, but casts rays only if renderer says so. fields: a "
+                               "path or an open Field by camera; cases share an open Field, which "
+                               "is neither read nor decoded again.");
   def_made_again(registration_case, "registration_case");
   registration_case.def(
       "set_xrays",

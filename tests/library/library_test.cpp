@@ -522,6 +522,38 @@ TEST(LibraryRegistration, AnExchangedXrayIsRegisteredAsOneThatWasLoaded) {
   }
 }
 
+TEST(LibraryRegistration, CasesShareFieldsThatAreOpen) {
+  const fs::path folder =
+      fs::temp_directory_path() / ("library_test_" + std::to_string(std::random_device()()));
+  fs::create_directories(folder);
+  RegistrationOptions options;
+  for (const char* camera : {"AP", "LAT"}) {
+    const fs::path path = folder / (std::string(camera) + ".af.h5");
+    fs::copy_file(study_file(path.filename()), path);
+    options.opened_fields.emplace(camera, Field::open(path));
+  }
+  fs::remove_all(folder);
+  // The first needs fewer levels of the fields than the second, the third no more.
+  std::vector<RegistrationCase> cases;
+  for (const char* preset : {"fast", "robust", "fast"}) {
+    options.preset = preset;
+    cases.push_back(RegistrationCase::load(study_file("study.toml"), "", options));
+    const RegistrationCase alone =
+        RegistrationCase::load(study_file("study.toml"), "", options_with_fields(preset));
+    const Pose start = alone.frame().pose({-1.0, 0.5, 2.5}, {0.5, 1.0, 4.0});
+    expect_same(cases.back().run(start), alone.run(start));
+  }
+  options.opened_fields.emplace("PA", options.opened_fields.at("AP"));
+  EXPECT_THAT(message_of<InputError>(
+                  [&] { (void)RegistrationCase::load(study_file("study.toml"), "", options); }),
+              HasSubstr("AP, LAT"));
+  options.opened_fields.erase("PA");
+  std::swap(options.opened_fields.at("AP"), options.opened_fields.at("LAT"));
+  EXPECT_THAT(message_of<FileError>(
+                  [&] { (void)RegistrationCase::load(study_file("study.toml"), "", options); }),
+              HasSubstr("field of camera 'LAT'"));
+}
+
 TEST(LibraryRegistration, StartsAtTheNominalPoseWithoutLandmarks) {
   RegistrationOptions options;
   options.renderer = "raycast";

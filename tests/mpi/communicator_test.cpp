@@ -121,6 +121,23 @@ TEST(Communicator, NodeMemoryFromRankZeroIsFilledThereAloneAndSeenByAll) {
                Error);
 }
 
+TEST(Communicator, NodeMemoryFromRankZerosNodeIsFilledByItsRanksTogether) {
+  const Communicator world = Communicator::world();
+  // The ranks of the tests are on one node.
+  const auto memory = world.allocate_on_nodes_from_root_together(
+      static_cast<std::size_t>(world.size()), [&](std::span<std::byte> bytes, int part, int parts) {
+        EXPECT_EQ(part, world.rank());
+        EXPECT_EQ(parts, world.size());
+        bytes[static_cast<std::size_t>(part)] = std::byte(part + 1);
+      });
+  for (int rank = 0; rank < world.size(); ++rank)
+    EXPECT_EQ(memory.get()[rank], std::byte(rank + 1)) << rank;
+  const auto fill = [&](std::span<std::byte>, int part, int parts) {
+    if (part == parts - 1) throw FileError("a.h5", "is torn");
+  };
+  EXPECT_THROW(std::ignore = world.allocate_on_nodes_from_root_together(8, fill), Error);
+}
+
 /// Also where MPI runs: every rank by itself. library_test uses it where MPI is not even
 /// initialised.
 TEST(CommunicatorAlone, NeedsNoMpi) {

@@ -634,6 +634,17 @@ class RegistrationTest(unittest.TestCase):
             case.set_xray("PA", own)
         self.assertEqual(case.run(start).pose.tobytes(), first.pose.tobytes())
 
+    def test_cases_share_open_fields(self):
+        fields = {"AP": open_field("AP"), "LAT": STUDY / "LAT.af.h5"}
+        alone = af.RegistrationCase.load(STUDY / "study.toml", preset="fast", fields=self.fields)
+        start = alone.frame.pose((-1, 0.5, 2.5), (0.5, 1, 4))
+        expected = alone.run(start).pose.tobytes()
+        for _ in range(2):
+            case = af.RegistrationCase.load(STUDY / "study.toml", preset="fast", fields=fields)
+            self.assertEqual(case.run(start).pose.tobytes(), expected)
+        again = pickle.loads(pickle.dumps(case))
+        self.assertEqual(again.run(start).pose.tobytes(), expected)
+
     def test_wrong_options_are_refused_as_by_the_program(self):
         with self.assertRaisesRegex(af.InputError, "robust"):
             af.RegistrationCase.load(STUDY / "study.toml", preset="hasty")

@@ -19,22 +19,22 @@ StudyCase case_of(const std::vector<std::string>& fields) {
 }
 
 /// Stands for an open field: it is counted, and nobody looks into it.
-std::shared_ptr<const FieldInUse> some_field() {
+std::shared_ptr<const OpenedField> some_field() {
   const auto owner = std::make_shared<int>();
-  return {owner, reinterpret_cast<const FieldInUse*>(owner.get())};
+  return {owner, reinterpret_cast<const OpenedField*>(owner.get())};
 }
 
 TEST(KeptFields, AreThoseOfTheCaseAtHandThatALaterOneUses) {
   const std::vector<StudyCase> cases = {
       case_of({"a", "b"}), case_of({"a", "c"}), case_of({"c", "c"}), case_of({"a"})};
-  KeptFields kept(cases, nullptr);
+  KeptFields kept(cases);
   kept.begin_case(cases[0]);
   EXPECT_EQ(kept.find("a"), nullptr);
-  const std::shared_ptr<const FieldInUse> a = some_field();
-  std::weak_ptr<const FieldInUse> b;
+  const std::shared_ptr<const OpenedField> a = some_field();
+  std::weak_ptr<const OpenedField> b;
   kept.add("a", a);
   {
-    const std::shared_ptr<const FieldInUse> field = some_field();
+    const std::shared_ptr<const OpenedField> field = some_field();
     b = field;
     kept.add("b", field);
   }
@@ -42,7 +42,7 @@ TEST(KeptFields, AreThoseOfTheCaseAtHandThatALaterOneUses) {
   kept.begin_case(cases[1]);
   EXPECT_EQ(kept.find("a"), a);
   kept.add("a", a);
-  const std::shared_ptr<const FieldInUse> c = some_field();
+  const std::shared_ptr<const OpenedField> c = some_field();
   kept.add("c", c);
   kept.begin_case(cases[2]);
   EXPECT_EQ(kept.find("a"), nullptr);  // a later case does, but this one does not
