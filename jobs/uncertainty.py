@@ -325,7 +325,7 @@ def foretell(rows, constants):
         if row.has_pose:
             row.inflation = inflation_of(row, pose)
             row.tre_inflation = inflation_of(row, tre)
-        # Ends that the verdict calls not found have none, whatever the constants.
+        # Where the search failed there is no end, whatever the constants.
         if row.has_confidence and row.stated_confidence != 0.0:
             row.confidence = probability(coefficients, row.features())
 

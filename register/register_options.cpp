@@ -65,6 +65,10 @@ void RegisterOptions::describe(Fields& field) {
         "Do not read the CT (it may be absent): fields are trusted to be of this case");
   field.part(resume);
   field.part(pictures);
+  field("require_found",
+        is_found_required,
+        "End with exit code 7 also when the pose is doubtful; its files are written")
+      .not_deciding("results are the same");
   field("output", output_folder, "Folder for the results")
       .as("-o,--output")
       .stands_for(PathRole::OutputFolder)

@@ -36,6 +36,7 @@ struct RegisterOptions {
   bool skip_ct_check = false;
   cli::ResumeOptions resume;
   PictureOptions pictures;
+  bool is_found_required = false;  ///< a doubtful pose counts as not found, too
   std::filesystem::path output_folder;
 
   void describe(Fields& field);

@@ -178,7 +178,7 @@ void add_target_errors(const CaseToRegister& registered, std::vector<Registratio
                                  error_mm(record.result.room_from_ct)};
 }
 
-/// Rank 0. Writes what was found, the summary last.
+/// Rank 0. Writes what was found, the summary last. NotFoundError after that.
 void write_results(const RegisterOptions& options,
                    const CaseToRegister& registered,
                    const RunDescription& description,
@@ -191,7 +191,8 @@ void write_results(const RegisterOptions& options,
   registration.diagnose(best);
   warn_of(best.diagnosis.messages, world);
   warn_of_clipped(records, world);
-  const bool is_found = judgement_of(best).verdict != Verdict::NotFound;
+  const Verdict verdict = judgement_of(best).verdict;
+  const bool is_found = verdict != Verdict::NotFound;
   const RegistrationProblem& problem = *registration.problem;
   const std::filesystem::path slicer = options.output_folder / "slicer";
   // Before result.json: when that is there, everything is.
@@ -206,6 +207,10 @@ void write_results(const RegisterOptions& options,
   if (!is_found)
     throw NotFoundError("no pose was found (see the verdict); the results of the search are in " +
                         options.output_folder.string());
+  if (options.is_found_required && verdict != Verdict::Found)
+    throw NotFoundError(
+        "the pose is doubtful (see the verdict), and --require-found is set; it is in " +
+        options.output_folder.string());
 }
 
 }  // namespace

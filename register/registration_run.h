@@ -23,7 +23,8 @@ std::vector<RigidTransform> start_poses(const RegisterOptions& options,
                                         std::vector<std::string>& notes);
 
 /// Collective. Loads the case, registers it from every start and writes the output folder.
-/// NotFoundError, after writing the results, when no pose was found.
+/// NotFoundError, after writing the results, when no pose was found, or a doubtful one with
+/// --require-found.
 void run_registration(const RegisterOptions& typed,
                       const std::string& command_line,
                       const Communicator& world);

@@ -15,7 +15,8 @@ enum class ExitCode : int {
   File = 4,
   Numeric = 5,
   Internal = 6,
-  NotFound = 7,  ///< a search is done, its files are written, and what it sought is not found
+  NotFound = 7,  ///< a search is done, its files are written, and what it sought is not found,
+                 ///< or found with a doubt that the caller does not accept
   Stopped = 75,  ///< stopped on request, progress saved: run the same command again
 };
 

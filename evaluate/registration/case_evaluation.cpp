@@ -491,6 +491,7 @@ RegistrationRow registered_row(
   try {
     const RegistrationRecord record = run(start.room_from_ct);
     set_result(record, row);
+    if (record.view_values.empty()) row.verdict.clear();  // --no-uncertainty: nothing was judged
     if (record.result.has_pose()) {
       measure_pose(record.result.room_from_ct, yardstick, row);
       row.squared_distance = squared_distance_of(row);

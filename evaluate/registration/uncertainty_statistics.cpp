@@ -13,6 +13,7 @@
 #include "evaluate/statistics/roc.h"
 #include "files/number_json.h"
 #include "register/verdict/pose_covariance.h"
+#include "register/verdict/verdict.h"
 
 namespace af::evaluation {
 
@@ -70,6 +71,17 @@ json confidence_json(const std::vector<double>& successes, const std::vector<dou
   return result;
 }
 
+/// How many right and how many wrong ends have each verdict.
+json verdicts_json(const RowPointers& rows, double success_mm) {
+  std::map<std::string, std::map<std::string, int>> counts;
+  for (const registration::Verdict verdict : registration::kVerdicts)
+    counts[to_string(verdict)] = {{"right", 0}, {"wrong", 0}};
+  for (const RegistrationRow* row : rows)
+    if (!row->verdict.empty())
+      ++counts[row->verdict][row->is_right(success_mm) ? "right" : "wrong"];
+  return counts;
+}
+
 }  // namespace
 
 json uncertainty_statistics(const std::map<std::string, RowPointers>& by_patient,
@@ -77,8 +89,10 @@ json uncertainty_statistics(const std::map<std::string, RowPointers>& by_patient
   std::vector<double> successes;
   std::vector<double> failures;
   std::vector<double> squared_distances;
+  RowPointers all;
   for (const auto& [name, rows] : by_patient)
     for (const RegistrationRow* row : rows) {
+      all.push_back(row);
       const bool is_right = row->is_right(options.success_tre_mm);
       if (std::isfinite(row->uncertainty.confidence))
         (is_right ? successes : failures).push_back(row->uncertainty.confidence);
@@ -97,7 +111,8 @@ json uncertainty_statistics(const std::map<std::string, RowPointers>& by_patient
   return {{"pose_region_95", coverage_json(by_patient, options, pose)},
           {"tre_region_95", coverage_json(by_patient, options, tre)},
           {"median_squared_distance", number_json(summarize(squared_distances).median)},
-          {"confidence", confidence_json(successes, failures)}};
+          {"confidence", confidence_json(successes, failures)},
+          {"verdicts", verdicts_json(all, options.success_tre_mm)}};
 }
 
 }  // namespace af::evaluation

@@ -43,7 +43,7 @@ struct RegistrationOptions {
   int air_below_hu = -900;
   double step_mm = 1.0;
   std::uint64_t seed = 1;
-  bool no_uncertainty = false;  ///< no covariance and no confidence: all of Uncertainty is NaN
+  bool no_uncertainty = false;  ///< no covariance and no TREs; the confidence is a lower bound
   double calibration_error_px = 0.0;  ///< of every view's shift; covariances include it
   int threads = 1;                    ///< for one registration; 0: every processor
 };
@@ -73,7 +73,7 @@ struct Uncertainty {
   /// to hold the truth in all six directions, they would be larger.
   double tre_rms_mm = 0.0;
   double tre_95_mm = 0.0;   ///< stays below with a probability of 0.95
-  double confidence = 0.0;  ///< probability of a TRE below 2.5 mm
+  double confidence = 0.0;  ///< probability of a TRE below 2.5 mm; a lower bound without TREs
 };
 
 struct Registration {

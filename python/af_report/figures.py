@@ -171,7 +171,7 @@ def tre_scatter(groups, largest_mm, success_mm):
 
 
 def confidence(groups, success_mm):
-    """Stated confidence against the error; ends that the verdict calls not found have confidence 0."""
+    """Stated confidence against the error, 0 where there is no end."""
     groups, part = in_part(groups)
     figure, (axes,) = new_figure("Stated confidence against the error" + part)
     rows, lowest = [], 1e-3
@@ -179,9 +179,9 @@ def confidence(groups, success_mm):
         judged = [start for start in starts if math.isfinite(start.get("confidence", math.nan)) and math.isfinite(start["tre_mm"])]
         rows += [[label, start["confidence"], start["tre_mm"]] for start in judged]
         for found, name in ((True, label), (False, f"{label}: not found")):
-            shown = [start for start in judged if (start["confidence"] > 0) == found]
+            shown = [start for start in judged if (start.get("verdict") != "not found" and start["confidence"] > 0) == found]
             if shown or found:
-                axes.scatter([min(1 - lowest, max(lowest, start["confidence"])) if found else lowest / 3 for start in shown],
+                axes.scatter([min(1 - lowest, max(lowest, start["confidence"])) if start["confidence"] > 0 else lowest / 3 for start in shown],
                              [max(LOWEST_MM, start["tre_mm"]) for start in shown], s=18, label=name,
                              marker="o^sDv<"[place % 6] if found else "x", color=COLORS[place % 6])
     axes.set_xscale("logit")
@@ -192,7 +192,7 @@ def confidence(groups, success_mm):
     axes.set_xticks([], minor=True)
     axes.set_ylim(LOWEST_MM, max(HIGHEST_MM, axes.get_ylim()[1]))
     millimetres(axes.yaxis, axes.get_ylim()[1])
-    axes.set(xlabel="confidence that the end is right; 0: the verdict is not found", ylabel="final TRE (mm)")
+    axes.set(xlabel="confidence that the end is right", ylabel="final TRE (mm)")
     line_at(axes, success_mm, f"right: below {success_mm:g} mm")
     axes.legend(loc="upper left")
     return figure, ["group", "confidence", "tre_mm"], rows

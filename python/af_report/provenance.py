@@ -30,8 +30,8 @@ WORDS = [
                 "denominator."),
     ("mRPD", "Mean reprojection distance: of a target point at the gold pose from the line through the source and the same point at the "
              "found pose; mm (van de Kraats et al., IEEE TMI 24(9), 2005)."),
-    ("Confidence", "What a registration states of its own end, without the truth: that it is right, from 0 to 1; 0 where the verdict is "
-                   "not found."),
+    ("Confidence", "What a registration states of its own end, without the truth: that it is right, from 0 to 1. From 0.99 on the "
+                   "verdict is found, below 0.05 not found."),
     ("95 % interval", "Wilson's score interval. It treats starts as independent; starts of one patient share a CT and its X-rays, so it says "
                       "nothing about other patients."),
     ("PSNR", Markup("20 log<sub>10</sub>(I<sub>max</sub> / RMS difference), I<sub>max</sub> the reference's maximum, over pixels whose ray "

@@ -210,6 +210,15 @@ def confidence_table(renderers):
                   "#Pose inside its stated 95 % region"], rows, "What registrations say of their own ends") if rows else None
 
 
+def verdict_table(renderers):
+    rows = []
+    for renderer in renderers:
+        counts = (renderer.get("uncertainty") or {}).get("verdicts")
+        for verdict in ("found", "doubtful", "not found") if counts else ():
+            rows.append([method_name(renderer["renderer"]), verdict, *(whole(counts[verdict][end]) for end in ("right", "wrong"))])
+    return Table(["Method", "Verdict", "#Right ends", "#Wrong ends"], rows, "What the verdicts say of right and of wrong ends") if rows else None
+
+
 def over_patients(renderers):
     texts = []
     for renderer in renderers:
@@ -317,7 +326,7 @@ def section(run, title):
     if any(case["views"] == 1 for case in summary["cases"]):
         blocks.append(Text(Markup("%s A single view hardly shows the depth along its rays, so a TRE says little; the reprojection distance "
                                   "(mRPD) measures what the view can show.") % strong("One view.")))
-    blocks += [confidence_table(renderers), other_errors_table(renderers), *over_patients(renderers),
+    blocks += [verdict_table(renderers), confidence_table(renderers), other_errors_table(renderers), *over_patients(renderers),
                paired_text(summary["field_against_raycast"]), case_table(renderers), gold_table(summary["cases"]), heading("Failures"),
                reason_table(renderers), *failures(run), *pictures(run)]
     return Section(run.anchor, title, [block for block in blocks if block])

@@ -49,7 +49,7 @@ class Run:
         starts = []
         for row in self.rows("registrations.csv"):
             start = {key: row.number(key) for key in columns if key in row or key != "confidence"}
-            for key in ("case", "renderer", "start_index", "success", "stop_reason", "error"):
+            for key in ("case", "renderer", "start_index", "success", "stop_reason", "error", *(["verdict"] if "verdict" in row else [])):
                 start[key] = row.text(key)
             starts.append(start)
         return starts

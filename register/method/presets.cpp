@@ -41,10 +41,10 @@ RegistrationOptions fast_preset() {
 /// were clean, wrong vertebrae came to 0.51 and right poses to 0.69 or more.
 constexpr double kConvincingValue = 0.6;
 
-/// What the verdict wants of every view of a found pose. Where the last resort ran only below 0.2,
-/// two starts were lost whose best ends had 0.21 and 0.26; right poses of 81 patients under every
-/// stress at once had 0.298 or more (docs/robust-tuning.md).
-/// \test Presets.TheLastResortRunsBelowWhatEveryViewOfAFoundPoseHas
+/// Below it a pose does not explain an X-ray well (kWellExplained). Where the last resort ran only
+/// below 0.2, two starts were lost whose best ends had 0.21 and 0.26; right poses of 81 patients
+/// under every stress at once had 0.298 or more (docs/robust-tuning.md). \test
+/// Presets.TheLastResortRunsBelowWhatIsWellExplained
 constexpr double kLastResortBelow = 0.3;
 
 /// Every chain ends over the region alone at level 1: at level 2 steel and scatter have optima of

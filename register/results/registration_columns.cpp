@@ -19,9 +19,12 @@ CsvCells registration_cells(const RegistrationRow& row, const RowParts& parts, O
           {"stop_reason", row.stop_reason}},
          cells);
   append(std::move(own.behind_stop_reason), cells);
-  append({{"inadmissible", row.inadmissible}, {"drr_count", row.drr_count}, {"chain", row.chain}},
+  append({{"inadmissible", row.inadmissible},
+          {"drr_count", row.drr_count},
+          {"chain", row.chain},
+          {"verdict", row.verdict}},
          cells);
-  append(std::move(own.behind_chain), cells);
+  append(std::move(own.behind_verdict), cells);
   if (parts.uncertainty) {
     append(judge_cells(row.judge), cells);
     append(uncertainty_cells(row.uncertainty, row.chain_distance_mm), cells);

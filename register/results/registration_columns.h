@@ -32,7 +32,8 @@ struct RegistrationRow {
   std::string stop_reason;
   std::int64_t inadmissible = 0;
   std::int64_t drr_count = 0;
-  std::string chain;  ///< of the method, whose end was taken; empty for other programs' poses
+  std::string chain;    ///< of the method, whose end was taken; empty for other programs' poses
+  std::string verdict;  ///< empty where the end was not judged
   JudgeSummary judge = {{kMissing, kMissing}, {kMissing, kMissing}, kMissing, kMissing};
   UncertaintyReport uncertainty;
   double chain_distance_mm = kMissing;
@@ -53,6 +54,7 @@ struct RegistrationRow {
                     inadmissible,
                     drr_count,
                     chain,
+                    verdict,
                     judge,
                     uncertainty,
                     chain_distance_mm,
@@ -70,7 +72,7 @@ struct RowParts {
 /// A program's own columns.
 struct OwnCells {
   CsvCells behind_stop_reason = {};
-  CsvCells behind_chain = {};
+  CsvCells behind_verdict = {};
   CsvCells behind_uncertainty = {};
 };
 

@@ -98,8 +98,7 @@ std::string counts_text(const std::vector<RegistrationRecord>& records) {
   std::array<int, 3> counts{};
   for (const RegistrationRecord& record : records)
     ++counts[static_cast<std::size_t>(judgement_of(record).verdict)];
-  const std::array verdicts{Verdict::Found, Verdict::Doubtful, Verdict::NotFound};
-  return joined(verdicts, ", ", [&](Verdict verdict) {
+  return joined(kVerdicts, ", ", [&](Verdict verdict) {
     return std::to_string(counts[static_cast<std::size_t>(verdict)]) + " " + to_string(verdict);
   });
 }
@@ -144,7 +143,7 @@ json views_json(const RegistrationRecord& record, const RegistrationProblem& pro
                      {"judge_value_beside", number_or_null(values[i].background)},
                      {"agrees", is_judged ? json(agrees) : json()}});
   }
-  return {{"verdict", agree ? "nothing found" : "suspicious"},
+  return {{"verdict", agree ? "no fault found" : "suspicious"},
           {"findings", record.diagnosis.messages},
           {"cameras", views}};
 }
@@ -236,6 +235,7 @@ void set_result(const RegistrationRecord& record, RegistrationRow& row) {
   row.inadmissible = result.inadmissible;
   row.drr_count = result.drr_count;
   row.chain = result.chain;
+  row.verdict = to_string(judgement_of(record).verdict);
   row.judge = judge_summary(record.view_values);
   row.uncertainty = record.uncertainty;
   row.chain_distance_mm = result.chain_distance_mm;
@@ -258,11 +258,9 @@ CsvCells cells_of(const RegistrationRecord& record,
     row.initial_tre_mm = record.errors->initial_tre_mm;
     row.tre_mm = record.errors->tre_mm;
   }
-  return registration_cells(
-      row,
-      {.uncertainty = true, .correction = row.correction.has_value()},
-      {.behind_chain = {{"relative_to", "nominal"},
-                        {"verdict", to_string(judgement_of(record).verdict)}}});
+  return registration_cells(row,
+                            {.uncertainty = true, .correction = row.correction.has_value()},
+                            {.behind_verdict = {{"relative_to", "nominal"}}});
 }
 
 }  // namespace
@@ -407,11 +405,9 @@ std::string summary_text(const RegistrationRecord& record, const RegistrationPro
       << "   (rx, ry, rz, tx, ty, tz from nominal)\n"
       << "result      " << parameters_line(parameters_from_pose(frame, result.room_from_ct)) << '\n'
       << "similarity  " << fixed_text(result.similarity, 4) << '\n';
-  if (std::isfinite(record.uncertainty.tre_95_mm) && std::isfinite(record.uncertainty.confidence))
-    out << "uncertain   TRE below " << fixed_text(record.uncertainty.tre_95_mm, 2)
-        << " mm with 95 % probability if the pose is the right one; it is, with a probability of "
-        << fixed_text(std::min(99.9, 100.0 * record.uncertainty.confidence), 1)
-        << " % (docs/uncertainty.md)\n";
+  if (std::isfinite(record.uncertainty.tre_95_mm))
+    out << "uncertain   if it is right, TRE below " << fixed_text(record.uncertainty.tre_95_mm, 2)
+        << " mm with 95 % (docs/uncertainty.md)\n";
   if (record.errors.has_value())
     out << "TRE         " << fixed_text(record.errors->initial_tre_mm, 2) << " mm at the start, "
         << fixed_text(record.errors->tre_mm, 2)

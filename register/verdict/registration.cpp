@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/hash_random.h"
+#include "base/joined.h"
 #include "geometry/tre.h"
 #include "register/optimizer/newton_search.h"
 #include "register/problem/pose_target.h"
@@ -518,7 +519,7 @@ RegistrationRecord Registration::run(const RigidTransform& start_room_from_ct,
   record.start_index = start_index;
   record.result = search(start_room_from_ct, start_index);
   if (!examiner) return record;
-  record.view_values = examiner->view_values(record.result.room_from_ct, uncertainty->is_on());
+  record.view_values = examiner->view_values(record.result.room_from_ct, true);
   record.uncertainty = uncertainty->report(record.result, record.view_values);
   return record;
 }
@@ -534,7 +535,23 @@ void Registration::diagnose(RegistrationRecord& record) {
 }
 
 Judgement judgement_of(const RegistrationRecord& record) {
-  return judgement_of(record.result, record.view_values, record.diagnosis);
+  const RegistrationResult& result = record.result;
+  const auto failure = failure_of(result.stop_reason);
+  Judgement judgement = failure.has_value()
+                            ? Judgement{Verdict::NotFound, *failure}
+                            : judged_confidence(record.uncertainty, record.view_values.size());
+  // Whatever leaves a doubt, however high the confidence is, belongs to these.
+  std::vector<std::string> reasons = record.diagnosis.messages;
+  if (!failure.has_value())
+    for (const std::string& doubt : doubts_of(result, record.view_values)) reasons.push_back(doubt);
+  if (!reasons.empty() && judgement.verdict == Verdict::Found)
+    judgement.verdict = Verdict::Doubtful;
+  reasons.insert(reasons.begin(), judgement.reason);
+  if (!result.clipped_along.empty())
+    reasons.push_back("the start lay outside the field's range along " + result.clipped_along +
+                      " and was clipped into it");
+  judgement.reason = joined(reasons, "; ");
+  return judgement;
 }
 
 }  // namespace af::registration

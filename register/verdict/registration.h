@@ -90,7 +90,9 @@ class Registration {
   ViewDiagnoser diagnoser_;
 };
 
-/// The verdict on a record: at least doubtful where the diagnosis found something.
+/// The verdict on a record by its confidence (judged_confidence()); not found where the search
+/// found nothing, at least doubtful where something else leaves a doubt. The reason names all of
+/// it, and tells of a clipped start.
 Judgement judgement_of(const RegistrationRecord& record);
 
 }  // namespace af::registration

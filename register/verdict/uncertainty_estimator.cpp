@@ -34,8 +34,9 @@ void UncertaintyOptions::describe(Fields& field) {
   field.start_group("Uncertainty");
   field("no_uncertainty",
         is_left_out,
-        "Do not say how far the pose may be from the truth: no covariance, no confidence. Saves "
-        "some 13 DRRs with derivatives and 4 without per view");
+        "Do not say how far the pose may be from the truth: no covariance, no predicted TRE. Saves "
+        "some 13 DRRs with derivatives per view. af-register's confidence is then a lower bound, "
+        "so that fewer poses are found; af-evaluate has neither confidence nor verdict");
   field("calibration_error_px",
         calibration_error_px,
         "Error of the cameras' calibration to include in covariances: the standard deviation "
@@ -111,15 +112,11 @@ double UncertaintyEstimator::add_covariance(const RegistrationResult& result,
 UncertaintyReport UncertaintyEstimator::report(const RegistrationResult& result,
                                                std::span<const ViewValue> view_values) {
   UncertaintyReport report;
-  if (!is_on()) return report;
-  if (!result.has_pose()) {
-    report.confidence = 0.0;
-    return report;
-  }
-  const double sandwich_tre_mm = add_covariance(result, view_values, report);
-  report.confidence = success_confidence({view_values, sandwich_tre_mm});
-  if (judged_end(result.stop_reason, view_values).verdict == Verdict::NotFound)
-    report.confidence = 0.0;
+  double sandwich_tre_mm = UncertaintyReport::kNone;
+  if (result.has_pose() && !ends_.empty())
+    sandwich_tre_mm = add_covariance(result, view_values, report);
+  const bool has_end = result.has_pose() && !failure_of(result.stop_reason).has_value();
+  report.confidence = has_end ? success_confidence({view_values, sandwich_tre_mm}) : 0.0;
   return report;
 }
 

@@ -16,7 +16,7 @@
 namespace af::registration {
 
 struct UncertaintyOptions {
-  bool is_left_out = false;
+  bool is_left_out = false;           ///< all but the confidence
   double calibration_error_px = 0.0;  ///< per axis and view
 
   void describe(Fields& field);
@@ -30,20 +30,18 @@ struct UncertaintyOptions {
 /// UncertaintyEstimator.ForetellsTheSpreadOfNoisyXrays
 class UncertaintyEstimator {
  public:
-  /// `problem` and `method`: of the registration. Reports stay empty when
-  /// uncertainty is left out, and when X-rays have no gradients to measure the curvature.
+  /// `problem` and `method`: of the registration. Reports have only a confidence when uncertainty
+  /// is left out, and when X-rays have no gradients to measure the curvature.
   UncertaintyEstimator(std::shared_ptr<const RegistrationProblem> problem,
                        const RegistrationOptions& method,
                        const UncertaintyOptions& options,
                        const std::shared_ptr<ThreadPool>& pool = nullptr);
 
-  /// Whether reports say anything.
-  [[nodiscard]] bool is_on() const { return !ends_.empty(); }
-
   /// `view_values`: of PoseExaminer, with backgrounds, at the result's end. Covariance and TREs are
   /// NaN when there is no end, when some motion from it is admissible to neither side, when too
   /// little of a silhouette is visible, and when values within silhouettes are of a stage that
-  /// looks at the region, or the other way round; the confidence is 0 when nothing was found.
+  /// looks at the region, or the other way round; the confidence is 0 where
+  /// failure_of() says why there is no end.
   [[nodiscard]] UncertaintyReport report(const RegistrationResult& result,
                                          std::span<const ViewValue> view_values);
 
@@ -58,7 +56,7 @@ class UncertaintyEstimator {
   std::vector<View> views_;
   std::map<std::string, std::size_t> stage_of_chain_;
   std::vector<std::string> similarities_;  ///< of the stages, as registered with
-  std::vector<PreparedStage> ends_;        ///< one for every way to end; none: nothing is said
+  std::vector<PreparedStage> ends_;        ///< one for every way to end; none: no covariance
 };
 
 }  // namespace af::registration

@@ -22,7 +22,9 @@ struct UncertaintyReport {
   double tre_95_mm = kNone;      ///< the TRE is below this with probability 0.95
   double inflation = kNone;      ///< what calibration multiplied the sandwich by for the covariance
   double tre_inflation = kNone;  ///< and for the TREs
-  double confidence = kNone;     ///< probability that the registration succeeded (TRE below 2.5 mm)
+  /// Probability that the registration succeeded (success_confidence()); a lower bound where
+  /// tre_rms_mm is NaN, 0 where there is no end.
+  double confidence = kNone;
 
   auto members() {
     return std::tie(covariance_deg_mm, tre_rms_mm, tre_95_mm, inflation, tre_inflation, confidence);

@@ -1,17 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <limits>
+#include <optional>
 #include <span>
 #include <string>
 #include <tuple>
+#include <vector>
 
-#include "register/optimizer/optimizer.h"
+#include "register/method/registration_result.h"
+#include "register/verdict/uncertainty_report.h"
 
 namespace af::registration {
 
 /// Whether a registration's end may be taken for the patient's pose.
 enum class Verdict { Found, Doubtful, NotFound };
+inline constexpr std::array kVerdicts{Verdict::Found, Verdict::Doubtful, Verdict::NotFound};
 
 /// "found", "doubtful", "not found": as in result files.
 const char* to_string(Verdict verdict);
@@ -39,42 +45,38 @@ struct ViewValue {
   auto members() { return std::tie(coarse, fine, in_silhouette, background); }
 };
 
-/// Limits by what was measured (docs/registration-study.md, Verdicts). An end whose means over the
-/// views are lower is not found: right poses under every stress at once had 0.29 and 0.11 or more.
-inline constexpr double kLeastCoarseMean = 0.2;
-inline constexpr double kLeastFineMean = 0.08;
+/// The verdict: found when the end is wrong with at most this risk, not found when it is right with
+/// less than this probability, doubtful between.
+inline constexpr double kFoundRisk = 0.01;
+inline constexpr double kLeastConfidence = 0.05;
 
-/// Every view of a found pose reaches these values; for wrong poses, at least one view does not.
-inline constexpr double kLeastCoarseOfFound = 0.3;
-inline constexpr double kLeastFineOfFound = 0.3;
-
-/// What the values of a kind must reach.
-struct VerdictLimits {
-  double coarse_mean;      ///< less: not found
-  double fine_mean;        ///< less: not found
-  double coarse_of_found;  ///< every view of a found pose has it
-  double fine_of_found;    ///< every view of a found pose has it
+/// What a view has whose X-ray a pose explains beyond question; for a wrong pose, at least one view
+/// has less (docs/registration-study.md, Verdicts). It steers searches for what is wrong with
+/// X-rays, not the verdict: under stress, right poses have less, too.
+struct WellExplained {
+  double coarse;
+  double fine;
 };
+inline constexpr WellExplained kWellExplained = {0.3, 0.3};
+/// Within silhouettes, by what was measured (docs/howto/bones.md, Verdicts).
+inline constexpr WellExplained kWellExplainedInSilhouettes = {0.3, 0.23};
 
-inline constexpr VerdictLimits kRegionLimits = {
-    kLeastCoarseMean, kLeastFineMean, kLeastCoarseOfFound, kLeastFineOfFound};
-
-/// Within silhouettes, by what was measured (docs/howto/bones.md, Verdicts): right poses had 0.36
-/// and 0.26 or more in every view; of 59 wrong ends none had 0.2 or more in detail in both views.
-inline constexpr VerdictLimits kSilhouetteLimits = {0.2, 0.12, 0.3, 0.23};
-
-/// By which limits values are judged.
-const VerdictLimits& limits_of(std::span<const ViewValue> values);
-
-/// A view disagrees when its coarse or fine value is below both the limit of a found pose and this
-/// share of the other views' highest value, provided that this highest value reaches the limit.
+/// A view disagrees when its coarse or fine value is below both that of a well explained view and
+/// this share of the other views' highest value, provided that this highest value is well
+/// explained.
 inline constexpr double kLeastShareOfOthers = 0.5;
 
-/// The verdict from the search's stop reason and the views' values at its end. `pinned_along`:
-/// RegistrationResult's.
-Judgement judged_end(StopReason stop_reason,
-                     std::span<const ViewValue> values,
-                     const std::string& pinned_along = "");
+/// Why there is no end at all, from what the search stopped with.
+std::optional<std::string> failure_of(StopReason stop_reason);
+
+/// What leaves a doubt in an end, however probable it is that it is right: how the search stopped,
+/// and an X-ray that cannot be judged.
+std::vector<std::string> doubts_of(const RegistrationResult& result,
+                                   std::span<const ViewValue> values);
+
+/// The verdict by the probability that the end is right, UncertaintyReport::confidence. Where no
+/// TRE is predicted, the confidence is a lower bound, by which nothing is rejected.
+Judgement judged_confidence(const UncertaintyReport& report, std::size_t views);
 
 /// Whether the other views agree with the pose much better than this one.
 bool disagrees(std::size_t view, std::span<const ViewValue> values);

@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "base/error.h"
-#include "base/joined.h"
 #include "register/method/presets.h"
 #include "register/verdict/pose_examiner.h"
 #include "register/verdict/registration.h"
@@ -129,7 +128,7 @@ std::optional<RegistrationOptions> coarse_options(const RegistrationProblem& pro
 }
 
 /// The values of the pose to which the changed problem comes from the nominal one; none when it
-/// cannot be registered, or when one of them is certainly lower than a found pose has.
+/// cannot be registered, or when one of them is certainly lower than where the pose explains well.
 std::optional<std::vector<ViewValue>> values_with(const Change& change,
                                                   const RegistrationProblem& problem,
                                                   const RegistrationOptions& options,
@@ -140,7 +139,7 @@ std::optional<std::vector<ViewValue>> values_with(const Change& change,
     Registration registration(changed, options, threads);
     const RegistrationResult end = registration.search(changed->nominal_room_from_ct);
     // The judge of the chains' ends says the mean of the coarse values.
-    if (!(end.similarity >= kLeastCoarseOfFound)) return std::nullopt;
+    if (!(end.similarity >= kWellExplained.coarse)) return std::nullopt;
     return PoseExaminer(changed, 0.0).view_values(end.room_from_ct);
   } catch (const InputError&) {  // an X-ray without gradients
     return std::nullopt;
@@ -154,7 +153,7 @@ std::optional<Remedy> best_remedy(const RegistrationProblem& problem,
   std::optional<Remedy> best;
   for (const Change& change : changes_of(problem)) {
     auto values = values_with(change, problem, *options, threads);
-    if (!values.has_value() || lowest_of(*values, &ViewValue::coarse) < kLeastCoarseOfFound)
+    if (!values.has_value() || lowest_of(*values, &ViewValue::coarse) < kWellExplained.coarse)
       continue;
     if (!best.has_value() || mean_of(*values) > mean_of(best->view_values))
       best = Remedy{change.text, std::move(*values)};
@@ -196,8 +195,8 @@ ViewDiagnosis ViewDiagnoser::diagnosis(const std::vector<ViewValue>& view_values
                                    "gradients that the pose explains: " +
                                    shares_text(*problem_, view_values));
   }
-  const bool is_sound = lowest_of(view_values, &ViewValue::coarse) >= kLeastCoarseOfFound &&
-                        lowest_of(view_values, &ViewValue::fine) >= kLeastFineOfFound;
+  const bool is_sound = lowest_of(view_values, &ViewValue::coarse) >= kWellExplained.coarse &&
+                        lowest_of(view_values, &ViewValue::fine) >= kWellExplained.fine;
   // No change mends a copy: what seems to is a body's symmetry.
   if (is_sound || has_copy) return diagnosis;
   // Mirrored, a shaft is still a shaft, so silhouettes of bones would fit changed X-rays too; and
@@ -210,22 +209,6 @@ ViewDiagnosis ViewDiagnoser::diagnosis(const std::vector<ViewValue>& view_values
         remedy->text + " would explain more: " + shares_text(*problem_, remedy->view_values) +
         " instead of " + shares_text(*problem_, view_values));
   return diagnosis;
-}
-
-Judgement judgement_of(const RegistrationResult& result,
-                       std::span<const ViewValue> view_values,
-                       const ViewDiagnosis& diagnosis) {
-  Judgement judgement = judged_end(result.stop_reason, view_values, result.pinned_along);
-  std::vector<std::string> reasons = diagnosis.messages;
-  if (reasons.empty() || judgement.verdict != Verdict::Found)
-    reasons.insert(reasons.begin(), judgement.reason);
-  if (!diagnosis.messages.empty() && judgement.verdict == Verdict::Found)
-    judgement.verdict = Verdict::Doubtful;
-  if (!result.clipped_along.empty())
-    reasons.push_back("the start lay outside the field's range along " + result.clipped_along +
-                      " and was clipped into it");
-  judgement.reason = joined(reasons, "; ");
-  return judgement;
 }
 
 }  // namespace af::registration

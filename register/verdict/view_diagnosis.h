@@ -3,12 +3,10 @@
 
 #include <memory>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
 #include "base/thread_pool.h"
-#include "register/method/registration_result.h"
 #include "register/problem/registration_problem.h"
 #include "register/verdict/verdict.h"
 
@@ -51,11 +49,5 @@ class ViewDiagnoser {
   /// None: not yet looked for. Holding none: no change lets a pose explain enough of every view.
   std::optional<std::optional<Remedy>> remedy_;
 };
-
-/// The judgement of a registration in the light of a diagnosis of its views: at least doubtful
-/// where that found something. Its reason also tells of a clipped start.
-Judgement judgement_of(const RegistrationResult& result,
-                       std::span<const ViewValue> view_values,
-                       const ViewDiagnosis& diagnosis);
 
 }  // namespace af::registration

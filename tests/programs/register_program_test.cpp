@@ -535,6 +535,17 @@ TEST_F(RegisterProgram, AnEndWhereTheFieldsRangeEndsIsDoubtfulAndSaysAlongWhat) 
   EXPECT_NE(found.at("verdict_reason").get<std::string>().find(said), std::string::npos) << found;
 }
 
+TEST_F(RegisterProgram, RequireFoundDoesNotAcceptADoubtfulPose) {
+  const std::string arguments = fields() + " --preset fast --start-rotation-deg -1,0.5,2.5 ";
+  const std::string cut_short = arguments + "--max-evaluations 14 -o " + path("cut-short");
+  expect_refused(run_register(cut_short), 0, "verdict     doubtful: right with ");
+  expect_refused(run_register(cut_short + " --require-found"), 7, "the pose is doubtful");
+  EXPECT_EQ(result("cut-short").at("verdict"), "doubtful");
+  EXPECT_TRUE(fs::exists(path("cut-short/pose.toml")));
+  const std::string whole = arguments + "--require-found -o " + path("required");
+  expect_refused(run_register(whole), 0, "verdict     found: right with ");
+}
+
 TEST_F(RegisterProgram, AStartThatCannotBeSearchedIsNotFound) {
   const std::string start = " --renderer raycast --start-translation-mm 0,0,500 -o ";
   const test::ProgramRun run = run_register(start + path("outside"));

@@ -607,7 +607,8 @@ class RegistrationTest(unittest.TestCase):
         )
         found = case.run(case.frame.pose((-1, 0.5, 2.5), (0.5, 1, 4)))
         self.assertTrue(np.isnan(found.uncertainty.covariance).all())
-        self.assertTrue(np.isnan(found.uncertainty.confidence))
+        self.assertTrue(np.isnan(found.uncertainty.tre_95_mm))
+        self.assertTrue(0 < found.uncertainty.confidence <= 1)
 
     def test_other_xrays_are_registered_and_pickled(self):
         case = af.RegistrationCase.load(STUDY / "study.toml", preset="fast", fields=self.fields)

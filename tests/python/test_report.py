@@ -127,6 +127,13 @@ class Pages(Copied):
         for name in ("nan", "NaN", "None", "Undefined"):
             self.assertNotIn(f">{name}<", html_of_page)
 
+    def test_count_the_verdicts_on_right_and_on_wrong_ends(self):
+        counts = {"doubtful": {"right": 2, "wrong": 613}, "found": {"right": 741, "wrong": 0}, "not found": {"right": 0, "wrong": 58}}
+        self.change("registration", lambda summary: summary["renderers"][0]["uncertainty"].update(verdicts=counts))
+        words = Page(self.page()).words
+        for row in ("fieldsfound7410", "fieldsdoubtful2613", "fieldsnot found058"):
+            self.assertIn(row, words)
+
     def test_begin_with_the_default_method(self):
         other = self.folder / "another"
         shutil.copytree(self.folder / "registration", other)

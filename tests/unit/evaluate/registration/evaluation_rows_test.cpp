@@ -49,6 +49,7 @@ TEST(RegistrationRows, TravelWithEveryBit) {
   sent.errors = {0.5, 1.0 / 3, 2.0, std::nan(""), 1e-300};
   sent.error = "numerics; \"failed\"\n";
   sent.chain = "far";
+  sent.verdict = "doubtful";
   const RegistrationRow received =
       value_of<TracedRow>(bytes_of(TracedRow{sent, {}}), "journal").row;
   EXPECT_EQ(received.case_name, sent.case_name);
@@ -62,6 +63,7 @@ TEST(RegistrationRows, TravelWithEveryBit) {
   EXPECT_EQ(received.errors.translation_mm, 1e-300);
   EXPECT_EQ(received.error, sent.error);
   EXPECT_EQ(received.chain, "far");
+  EXPECT_EQ(received.verdict, "doubtful");
   EXPECT_EQ(received.seconds, sent.seconds);
 }
 
@@ -279,10 +281,12 @@ RegistrationRow sure_row(double tre_mm, double squared_distance, double confiden
 }
 
 TEST(RegistrationStatistics, SayWhetherRegistrationsKnowTheirErrors) {
-  const Rows rows = {sure_row(0.5, 3.0, 0.99),
-                     sure_row(0.9, 12.0, 0.95),
-                     sure_row(1.5, 13.0, 0.6),
-                     sure_row(8.0, 900.0, 0.7)};
+  Rows rows = {sure_row(0.5, 3.0, 0.99),
+               sure_row(0.9, 12.0, 0.95),
+               sure_row(1.5, 13.0, 0.6),
+               sure_row(8.0, 900.0, 0.7)};
+  rows[0].verdict = "found";
+  rows[1].verdict = rows[3].verdict = "doubtful";
   const json found = renderer_statistics(rows, "field", {1})["uncertainty"];
   EXPECT_EQ(found["pose_region_95"]["successes"], 2);
   EXPECT_EQ(found["pose_region_95"]["starts"], 3);  // the failure is for the confidence to tell
@@ -293,6 +297,11 @@ TEST(RegistrationStatistics, SayWhetherRegistrationsKnowTheirErrors) {
   EXPECT_DOUBLE_EQ(confidence["roc_area"], 2.0 / 3.0);
   EXPECT_DOUBLE_EQ(confidence["at_least"][1]["share_of_successes"], 2.0 / 3.0);
   EXPECT_EQ(confidence["at_least"][0]["share_of_failures"], 1.0);
+  // One row was not judged.
+  EXPECT_EQ(found["verdicts"],
+            json({{"found", {{"right", 1}, {"wrong", 0}}},
+                  {"doubtful", {{"right", 1}, {"wrong", 1}}},
+                  {"not found", {{"right", 0}, {"wrong", 0}}}}));
   EXPECT_FALSE(
       renderer_statistics(Rows{row("field", 0, 4.0, 0.5)}, "field", {1}).contains("uncertainty"));
 }
@@ -584,6 +593,7 @@ TEST(RegisteredRow, MeasuresTheEndAgainstBothPoses) {
   EXPECT_EQ(found.errors.translation_mm, 0.25);
   EXPECT_EQ(found.errors.rotation_deg, 0.0);
   EXPECT_EQ(registrations_table(Rows{found}).text(0, "chain"), "wide-edges");
+  EXPECT_EQ(registrations_table(Rows{found}).text(0, "verdict"), "") << "nothing was judged";
 }
 
 TEST(RegisteredRow, OfARegistrationThatThrowsIsAFailure) {
@@ -615,6 +625,7 @@ TEST(RegisteredRow, OfAStartThatNeverMovedIsAFailureHoweverCloseItWas) {
   EXPECT_EQ(found.stop_reason, "start-inadmissible");
   EXPECT_TRUE(std::isnan(found.tre_mm));
   EXPECT_TRUE(std::isnan(found.judge.coarse.mean));
+  EXPECT_EQ(registrations_table(Rows{found}).text(0, "verdict"), "not found");
 }
 
 /// A run of one case whose gold pose turns the CT by a right angle about z.

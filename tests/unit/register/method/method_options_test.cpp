@@ -127,7 +127,7 @@ TEST(MethodOptions, ChainsTakeThePlaceOfThePresets) {
   EXPECT_EQ(method.chains[1].stages[1].level, 1);
 }
 
-TEST(Presets, TheLastResortRunsBelowWhatEveryViewOfAFoundPoseHas) {
+TEST(Presets, TheLastResortRunsBelowWhatIsWellExplained) {
   const RegistrationOptions robust = preset_options("robust");
   int last_resorts = 0;
   int again = 0;
@@ -135,7 +135,7 @@ TEST(Presets, TheLastResortRunsBelowWhatEveryViewOfAFoundPoseHas) {
     again += chain.from_best_end ? 1 : 0;
     if (!chain.is_last_resort()) continue;
     ++last_resorts;
-    EXPECT_EQ(chain.only_below, kLeastCoarseOfFound);
+    EXPECT_EQ(chain.only_below, kWellExplained.coarse);
     EXPECT_EQ(again, 0) << "searches about the best end come after all that may find a better one";
   }
   EXPECT_EQ(last_resorts, 1);

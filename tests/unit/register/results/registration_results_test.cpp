@@ -34,24 +34,28 @@ RunDescription some_run() {
   return run;
 }
 
-/// A record as record_of(), with views that say it is, or is not, found.
-RegistrationRecord judged_record(std::int64_t start_index, double similarity, double value) {
+/// A record as record_of(), with a confidence that says whether it is found.
+RegistrationRecord judged_record(std::int64_t start_index, double similarity, double confidence) {
   RegistrationRecord record = record_of(start_index, similarity);
-  record.view_values = {{value, value}, {value, value}};
+  record.view_values = {{0.8, 0.8}, {0.8, 0.8}};
+  record.uncertainty.confidence = confidence;
+  record.uncertainty.tre_rms_mm = 0.2;
+  record.uncertainty.tre_95_mm = 0.5;
   return record;
 }
 
 TEST(BestRecord, IsNoneThatIsNotFoundBesideOthers) {
   EXPECT_EQ(best_record({judged_record(0, 9.0, 0.0), judged_record(1, 2.0, 0.4)}), 1U);
-  EXPECT_EQ(best_record({judged_record(0, 9.0, 0.0), judged_record(1, 2.0, 0.1)}), 0U);
+  EXPECT_EQ(best_record({judged_record(0, 9.0, 0.0), judged_record(1, 2.0, 0.01)}), 0U);
 }
 
 TEST(ResultFiles, WhatIsNotFoundHasNoPoseThatAScriptCouldTake) {
   const test::ScratchFolder folder;
   const test::SmallCase small = test::small_case();
-  write_result_files(judged_record(0, 1.5, 0.8), *small.problem, some_run(), folder.path());
-  nlohmann::json json = result_json(judged_record(0, 1.5, 0.8), *small.problem, some_run());
+  write_result_files(judged_record(0, 1.5, 0.995), *small.problem, some_run(), folder.path());
+  nlohmann::json json = result_json(judged_record(0, 1.5, 0.995), *small.problem, some_run());
   EXPECT_EQ(json.at("verdict"), "found");
+  EXPECT_EQ(json.at("views").at("verdict"), "no fault found");
   // What an earlier run found goes.
   write_result_files(judged_record(0, 1.5, 0.0), *small.problem, some_run(), folder.path());
   for (const char* name : {"pose.toml", "result.tfm"})
@@ -64,14 +68,14 @@ TEST(ResultFiles, WhatIsNotFoundHasNoPoseThatAScriptCouldTake) {
   EXPECT_TRUE(json.contains("rejected_room_from_ct"));
   EXPECT_FALSE(json.contains("room_from_ct"));
   // And back.
-  write_result_files(judged_record(0, 1.5, 0.8), *small.problem, some_run(), folder.path());
+  write_result_files(judged_record(0, 1.5, 0.995), *small.problem, some_run(), folder.path());
   EXPECT_TRUE(std::filesystem::exists(folder / "result.tfm"));
   EXPECT_FALSE(std::filesystem::exists(folder / "rejected-pose.toml"));
 }
 
 TEST(ResultFiles, AFindingAboutTheXraysMakesAResultDoubtful) {
   const test::SmallCase small = test::small_case();
-  RegistrationRecord record = judged_record(0, 1.5, 0.8);
+  RegistrationRecord record = judged_record(0, 1.5, 0.995);
   record.diagnosis.messages = {"views 'AP' and 'LAT' have the same X-ray, pixel for pixel"};
   const nlohmann::json json = result_json(record, *small.problem, some_run());
   EXPECT_EQ(json.at("verdict"), "doubtful");
@@ -158,6 +162,12 @@ TEST(ResultFiles, ARunOfSeveralStartsLeavesATableAndTheBestResult) {
   EXPECT_EQ(summary.find("verdict     doubtful: "), 0U) << summary;
   EXPECT_NE(summary.find("0 found, 2 doubtful, 0 not found"), std::string::npos) << summary;
   EXPECT_NE(summary.find("highest similarity: start 1"), std::string::npos) << summary;
+  // Verdict and probability are one sentence, and the only one that speaks of either.
+  const std::string found =
+      write_run({judged_record(0, 1.0, 0.995)}, *small.problem, some_run(), folder.path());
+  EXPECT_EQ(found.find("verdict     found: right with 99.5 % (TRE below 2.5 mm), "), 0U) << found;
+  EXPECT_NE(found.find("uncertain   if it is right, TRE below 0.50 mm"), std::string::npos);
+  EXPECT_EQ(found.find("99.5 %"), found.rfind("99.5 %")) << found;
   EXPECT_EQ(CsvTable::read(folder / "registrations.csv").row_count(), 2U);
   EXPECT_NE(read_text_file(folder / "result.json").find("\"start_index\": 1"), std::string::npos);
 }

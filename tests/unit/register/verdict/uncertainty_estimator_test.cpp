@@ -13,6 +13,7 @@
 #include <gtest/gtest.h>
 
 #include "register/method/presets.h"
+#include "register/verdict/calibration.h"
 #include "register/verdict/pose_covariance.h"
 #include "register/verdict/pose_examiner.h"
 #include "register/verdict/pose_information.h"
@@ -231,10 +232,32 @@ TEST(UncertaintyEstimator, SaysNothingWithoutAnEnd) {
   const UncertaintyReport report = estimator.report(nothing, {});
   EXPECT_TRUE(std::isnan(report.covariance_deg_mm[0]));
   EXPECT_EQ(report.confidence, 0.0);
+  RegistrationResult no_better;
+  no_better.room_from_ct = small.gold_room_from_ct;
+  no_better.similarity = 1.0;
+  no_better.chain = "squares";
+  const std::vector<ViewValue> good = {{0.9, 0.9, false, 0.1}, {0.9, 0.9, false, 0.1}};
+  EXPECT_GT(estimator.report(no_better, good).confidence, 0.99);
+  no_better.stop_reason = StopReason::NoBetterThanNoDrr;
+  EXPECT_EQ(estimator.report(no_better, good).confidence, 0.0);
+}
+
+TEST(UncertaintyEstimator, LeftOutStatesALowerBoundOfTheConfidenceAlone) {
+  const test::SmallCase small = test::small_case();
+  RegistrationResult result;
+  result.room_from_ct = small.gold_room_from_ct;
+  result.similarity = 1.0;
+  result.chain = "squares";
+  const std::vector<ViewValue> values = {{0.5, 0.3, false, 0.1}, {0.5, 0.3, false, 0.1}};
   UncertaintyOptions none;
   none.is_left_out = true;
-  EXPECT_TRUE(std::isnan(
-      UncertaintyEstimator(small.problem, squares(), none).report(nothing, {}).confidence));
+  const UncertaintyReport left_out =
+      UncertaintyEstimator(small.problem, squares(), none).report(result, values);
+  EXPECT_EQ(left_out.confidence, success_confidence({values, std::nan("")}));
+  EXPECT_TRUE(std::isnan(left_out.covariance_deg_mm[0]));
+  EXPECT_TRUE(std::isnan(left_out.tre_rms_mm));
+  EXPECT_LE(left_out.confidence,
+            UncertaintyEstimator(small.problem, squares(), {}).report(result, values).confidence);
 }
 
 TEST(UncertaintyEstimator, TakesRobustGradientsWhereAMeasureHasNoDerivative) {

@@ -13,6 +13,7 @@
 
 #include "base/hash_random.h"
 #include "register/verdict/pose_examiner.h"
+#include "register/verdict/registration.h"
 #include "register/verdict/view_diagnosis.h"
 #include "unit/register/method/narrow_drr.h"
 #include "unit/register/method/registration_cases.h"
@@ -20,80 +21,116 @@
 namespace af::registration {
 namespace {
 
-Verdict verdict_of(const std::vector<ViewValue>& values,
-                   StopReason stop_reason = StopReason::StepBelowFinal) {
-  const Judgement judgement = judged_end(stop_reason, values);
+/// A record that converged, with a predicted TRE.
+RegistrationRecord record_with(double confidence,
+                               const std::vector<ViewValue>& values = {{0.9, 0.9}, {0.9, 0.9}}) {
+  RegistrationRecord record;
+  record.view_values = values;
+  record.uncertainty.confidence = confidence;
+  record.uncertainty.tre_rms_mm = 0.2;
+  return record;
+}
+
+Verdict verdict_of(const RegistrationRecord& record) {
+  const Judgement judgement = judgement_of(record);
   EXPECT_FALSE(judgement.reason.empty());
   return judgement.verdict;
 }
 
-TEST(Judgement, AFoundPoseIsGoodInEveryView) {
-  EXPECT_EQ(verdict_of({{0.7, 0.6}, {0.6, 0.5}}), Verdict::Found);
-  EXPECT_EQ(verdict_of({{0.7, 0.6}, {0.29, 0.5}}), Verdict::Doubtful);
-  EXPECT_EQ(verdict_of({{0.7, 0.6}, {0.6, 0.29}}), Verdict::Doubtful);
-  EXPECT_EQ(verdict_of({{0.7, 0.6}, {0.0, 0.0}}), Verdict::Doubtful);
-  EXPECT_EQ(verdict_of({{0.7, 0.6}}), Verdict::Found);
+TEST(Judgement, FollowsTheConfidenceAlone) {
+  const std::vector<std::pair<double, Verdict>> expected = {{1.0, Verdict::Found},
+                                                            {0.99, Verdict::Found},
+                                                            {0.9899, Verdict::Doubtful},
+                                                            {0.05, Verdict::Doubtful},
+                                                            {0.0499, Verdict::NotFound},
+                                                            {0.0, Verdict::NotFound},
+                                                            {std::nan(""), Verdict::Doubtful}};
+  // Whatever the X-rays show of the pose: little of it under stress, or in a coarse field.
+  for (const auto& [confidence, verdict] : expected)
+    for (const ViewValue value : {ViewValue{0.9, 0.9}, ViewValue{0.15, 0.05}})
+      EXPECT_EQ(verdict_of(record_with(confidence, {value, value})), verdict) << confidence;
 }
 
-TEST(Judgement, APoseThatExplainsNextToNothingIsNotFound) {
-  EXPECT_EQ(verdict_of({{0.3, 0.2}, {0.09, 0.1}}), Verdict::NotFound);
-  EXPECT_EQ(verdict_of({{0.4, 0.1}, {0.3, 0.05}}), Verdict::NotFound);
-  EXPECT_EQ(verdict_of({{0.1, 0.1}}), Verdict::NotFound);
+TEST(Judgement, SaysTheProbabilityAndWhatWasWanted) {
+  const auto reason = [](double confidence) {
+    return judgement_of(record_with(confidence)).reason;
+  };
+  EXPECT_EQ(reason(0.9968), "right with 99.6 % (TRE below 2.5 mm), at least 99.0 % wanted");
+  EXPECT_EQ(reason(1.0), "right with 99.9 % (TRE below 2.5 mm), at least 99.0 % wanted");
+  // Rounded down: 99.0 % would be found.
+  EXPECT_EQ(reason(0.98999), "right with 98.9 % (TRE below 2.5 mm), at least 99.0 % wanted");
+  EXPECT_EQ(reason(0.012), "right with 1.2 % (TRE below 2.5 mm), at least 5.0 % wanted");
+  EXPECT_EQ(judgement_of(record_with(0.9968, {{0.9, 0.9}})).reason,
+            "right with 99.6 % (mRPD below 2.5 mm), at least 99.0 % wanted");
+}
+
+// Without it the confidence is a lower bound.
+TEST(Judgement, WithoutAPredictedTreRejectsNothing) {
+  RegistrationRecord record = record_with(0.012);
+  record.uncertainty.tre_rms_mm = std::nan("");
+  EXPECT_EQ(verdict_of(record), Verdict::Doubtful);
+  EXPECT_EQ(judgement_of(record).reason,
+            "right with at least 1.2 % (TRE below 2.5 mm), at least 99.0 % wanted");
+  record.uncertainty.confidence = 0.995;
+  EXPECT_EQ(verdict_of(record), Verdict::Found);
+  record.uncertainty.confidence = 0.0;  // there is no end
+  EXPECT_EQ(verdict_of(record), Verdict::NotFound);
 }
 
 TEST(Judgement, WhatWasNotSearchedIsNotFoundWhateverItsValue) {
-  const std::vector<ViewValue> good = {{0.9, 0.9}, {0.9, 0.9}};
+  RegistrationRecord record = record_with(0.995);
   for (const StopReason reason : {StopReason::StartInadmissible,
                                   StopReason::CtOutsideRoi,
                                   StopReason::NonFiniteSimilarity,
-                                  StopReason::NoBetterThanNoDrr})
-    EXPECT_EQ(verdict_of(good, reason), Verdict::NotFound) << to_string(reason);
-  for (const StopReason reason : {StopReason::PinnedAtLimit, StopReason::EvaluationBudgetSpent})
-    EXPECT_EQ(verdict_of(good, reason), Verdict::Doubtful) << to_string(reason);
-  EXPECT_EQ(verdict_of({{0.1, 0.1}}, StopReason::PinnedAtLimit), Verdict::NotFound);
+                                  StopReason::NoBetterThanNoDrr}) {
+    record.result.stop_reason = reason;
+    EXPECT_EQ(verdict_of(record), Verdict::NotFound) << to_string(reason);
+    EXPECT_EQ(judgement_of(record).reason.find("right with"), std::string::npos);
+  }
+  for (const StopReason reason : {StopReason::PinnedAtLimit, StopReason::EvaluationBudgetSpent}) {
+    record.result.stop_reason = reason;
+    EXPECT_EQ(verdict_of(record), Verdict::Doubtful) << to_string(reason);
+  }
+  record = record_with(0.01);
+  record.result.stop_reason = StopReason::PinnedAtLimit;
+  EXPECT_EQ(verdict_of(record), Verdict::NotFound);
 }
 
 TEST(Judgement, SaysWhereTheRangeEndsAndWhereTheStartWasClipped) {
-  const std::vector<ViewValue> good = {{0.9, 0.9}, {0.9, 0.9}};
-  RegistrationResult result;
-  result.stop_reason = StopReason::PinnedAtLimit;
-  result.pinned_along = "rx, rz, tx";
+  const std::string probability = "right with 99.5 % (TRE below 2.5 mm), at least 99.0 % wanted; ";
+  RegistrationRecord record = record_with(0.9951);
+  record.result.stop_reason = StopReason::PinnedAtLimit;
+  record.result.pinned_along = "rx, rz, tx";
   const std::string ends =
       "the field's range ends here along rx, rz, tx: the optimum may lie outside";
-  EXPECT_EQ(judgement_of(result, good, {}).reason, ends);
+  EXPECT_EQ(judgement_of(record).reason, probability + ends);
   // What a diagnosis finds does not replace it.
-  const ViewDiagnosis diagnosis{{"view 'B' does not agree"}};
-  EXPECT_EQ(judgement_of(result, good, diagnosis).reason, ends + "; view 'B' does not agree");
-  EXPECT_EQ(judgement_of(result, good, diagnosis).verdict, Verdict::Doubtful);
-  result = RegistrationResult();
-  result.clipped_along = "ry";
-  const Judgement clipped = judgement_of(result, good, {});
-  EXPECT_EQ(clipped.verdict, Verdict::Found);
-  EXPECT_TRUE(clipped.reason.ends_with(
-      "; the start lay outside the field's range along ry and was clipped into it"))
-      << clipped.reason;
+  record.diagnosis.messages = {"view 'B' does not agree"};
+  EXPECT_EQ(judgement_of(record).reason, probability + "view 'B' does not agree; " + ends);
+  EXPECT_EQ(verdict_of(record), Verdict::Doubtful);
+  record.result = RegistrationResult();
+  EXPECT_EQ(verdict_of(record), Verdict::Doubtful) << "what a diagnosis finds is enough";
+  record = record_with(0.9951);
+  record.result.clipped_along = "ry";
+  EXPECT_EQ(verdict_of(record), Verdict::Found);
+  EXPECT_EQ(
+      judgement_of(record).reason,
+      probability + "the start lay outside the field's range along ry and was clipped into it");
 }
 
 TEST(Judgement, AViewThatCannotBeJudgedLeavesADoubt) {
   const double nan = std::nan("");
-  EXPECT_EQ(verdict_of({{nan, nan}, {0.6, 0.5}}), Verdict::Doubtful);
-  EXPECT_EQ(verdict_of({{0.6, nan}, {0.6, 0.5}}), Verdict::Doubtful);
-  EXPECT_EQ(verdict_of({{0.6, nan}}), Verdict::Doubtful);
-  EXPECT_EQ(verdict_of({{nan, nan}, {0.1, 0.1}}), Verdict::NotFound);
-  EXPECT_EQ(verdict_of({{nan, nan}}), Verdict::Doubtful);
-  EXPECT_EQ(verdict_of({}), Verdict::Doubtful);
-}
-
-TEST(Judgement, WithinSilhouettesHasLimitsOfItsOwn) {
-  const auto verdict_within = [](double coarse, double fine) {
-    return verdict_of({{0.4, 0.4, true}, {coarse, fine, true}});
+  const auto verdict_with = [](const std::vector<ViewValue>& values, double confidence) {
+    return verdict_of(record_with(confidence, values));
   };
-  EXPECT_EQ(verdict_within(0.36, 0.26), Verdict::Found);
-  EXPECT_EQ(verdict_within(0.36, 0.18), Verdict::Doubtful);
-  EXPECT_EQ(verdict_within(0.29, 0.26), Verdict::Doubtful);
-  EXPECT_EQ(verdict_of({{0.3, 0.11, true}, {0.3, 0.11, true}}), Verdict::NotFound);
-  EXPECT_EQ(verdict_of({{0.19, 0.3, true}, {0.19, 0.3, true}}), Verdict::NotFound);
-  EXPECT_EQ(verdict_of({{0.4, 0.4}, {0.36, 0.26}}), Verdict::Doubtful);
+  EXPECT_EQ(verdict_with({{nan, nan}, {0.6, 0.5}}, 0.995), Verdict::Doubtful);
+  EXPECT_EQ(verdict_with({{0.6, nan}, {0.6, 0.5}}, 0.995), Verdict::Doubtful);
+  EXPECT_EQ(verdict_with({{nan, nan}, {0.1, 0.1}}, 0.01), Verdict::NotFound);
+  EXPECT_EQ(verdict_with({{nan, nan}}, nan), Verdict::Doubtful);
+  EXPECT_EQ(verdict_with({}, nan), Verdict::Doubtful);
+  EXPECT_NE(judgement_of(record_with(0.995, {{0.6, 0.5}, {nan, nan}}))
+                .reason.find("X-ray 2 of 2 cannot be judged"),
+            std::string::npos);
 }
 
 TEST(Disagreement, IsOneViewFarBelowAnotherThatIsGood) {
@@ -106,6 +143,10 @@ TEST(Disagreement, IsOneViewFarBelowAnotherThatIsGood) {
   EXPECT_FALSE(disagrees(1, both_bad));
   const std::vector<ViewValue> alike = {{0.45, 0.2}, {0.29, 0.0}};
   EXPECT_FALSE(disagrees(1, alike));
+  // Within silhouettes less detail is enough.
+  EXPECT_TRUE(disagrees(1, std::vector<ViewValue>{{0.9, 0.6}, {0.9, 0.26}}));
+  EXPECT_FALSE(disagrees(1, std::vector<ViewValue>{{0.9, 0.6, true}, {0.9, 0.26, true}}));
+  EXPECT_TRUE(disagrees(1, std::vector<ViewValue>{{0.9, 0.6, true}, {0.9, 0.22, true}}));
 }
 
 /// A small case with pyramids (of the same renderer), which the diagnosis needs.
@@ -128,8 +169,8 @@ TEST(PoseExaminer, TellsARightPoseFromAWrongOneInEveryView) {
   const auto wrong = examiner.view_values(beside_gold(small, 8.0));
   ASSERT_EQ(right.size(), 2U);
   for (std::size_t i = 0; i < 2; ++i) {
-    EXPECT_GT(right[i].coarse, kLeastCoarseOfFound);
-    EXPECT_GT(right[i].fine, kLeastFineOfFound);
+    EXPECT_GT(right[i].coarse, kWellExplained.coarse);
+    EXPECT_GT(right[i].fine, kWellExplained.fine);
     EXPECT_LT(wrong[i].coarse, 0.5 * right[i].coarse);
   }
 }
