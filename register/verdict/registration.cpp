@@ -534,7 +534,10 @@ void Registration::diagnose(RegistrationRecord& record) {
 }
 
 Judgement judgement_of(const RegistrationRecord& record) {
-  return judgement_of(record.result, record.view_values, record.diagnosis);
+  Judgement judgement = judgement_of(record.result, record.view_values, record.diagnosis);
+  if (record.view_values.size() == 1 && judgement.verdict != Verdict::NotFound)
+    judgement.reason += "; " + depth_text(record.uncertainty.depth_95_mm);
+  return judgement;
 }
 
 }  // namespace af::registration

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -124,6 +125,15 @@ Judgement judged_end(StopReason stop_reason,
   if (!doubt.has_value()) return judgement;
   if (judgement.verdict == Verdict::Found) return {Verdict::Doubtful, *doubt};
   return {judgement.verdict, judgement.reason + "; " + *doubt};
+}
+
+std::string depth_text(double depth_95_mm) {
+  if (!std::isfinite(depth_95_mm)) return "depth along the beam not known";
+  const auto tenths = static_cast<std::int64_t>(std::ceil(10.0 * depth_95_mm));
+  const std::string text = tenths < 100
+                               ? std::to_string(tenths / 10) + "." + std::to_string(tenths % 10)
+                               : std::to_string((tenths + 9) / 10);
+  return "depth along the beam within " + text + " mm";
 }
 
 const VerdictLimits& limits_of(std::span<const ViewValue> values) {

@@ -76,6 +76,10 @@ Judgement judged_end(StopReason stop_reason,
                      std::span<const ViewValue> values,
                      const std::string& pinned_along = "");
 
+/// What one view leaves open of a pose that it shows: "depth along the beam within 24 mm", rounded
+/// up; NaN: not known.
+std::string depth_text(double depth_95_mm);
+
 /// Whether the other views agree with the pose much better than this one.
 bool disagrees(std::size_t view, std::span<const ViewValue> values);
 
