@@ -2,24 +2,14 @@
 #include "evaluate/registration/registration_errors.h"
 
 #include <cmath>
-#include <numeric>
 
 #include "base/error.h"
 #include "geometry/point_distances.h"
+#include "geometry/target_box.h"
 
 namespace af::evaluation {
 
 using Eigen::Vector3d;
-
-namespace {
-
-double depth_error_mm(const CameraGeometry& camera,
-                      const Vector3d& room_mm,
-                      const Vector3d& gold_room_mm) {
-  return std::abs((room_mm - gold_room_mm).dot((gold_room_mm - camera.source_point).normalized()));
-}
-
-}  // namespace
 
 RegistrationErrors registration_errors(const RigidTransform& room_from_ct,
                                        const RigidTransform& gold_room_from_ct,
@@ -49,11 +39,10 @@ RegistrationErrors registration_errors(const RigidTransform& room_from_ct,
   errors.projection_detector_mm = detector_mm / count;
   errors.projection_isocenter_mm = isocenter_mm / count;
   if (rig.cameras.size() == 1) {
-    const Vector3d target_ct_mm =
-        std::accumulate(points_ct_mm.begin(), points_ct_mm.end(), Vector3d(Vector3d::Zero())) /
-        static_cast<double>(points_ct_mm.size());
-    errors.depth_mm = depth_error_mm(
-        rig.cameras.front(), room_from_ct * target_ct_mm, gold_room_from_ct * target_ct_mm);
+    const Vector3d target_ct_mm = mean_point(points_ct_mm);
+    const Vector3d gold_mm = gold_room_from_ct * target_ct_mm;
+    const Vector3d beam = (gold_mm - rig.cameras.front().source_point).normalized();
+    errors.depth_mm = std::abs((room_from_ct * target_ct_mm - gold_mm).dot(beam));
   }
   return errors;
 }

@@ -118,8 +118,8 @@ def tre_histogram(groups, success_mm, error="TRE"):
     for place, (label, starts) in enumerate(groups):
         counts = [0] * len(edges)
         for start in starts:
-            error = start["error_mm"]
-            step = 8 * math.log10(max(error, LOWEST_MM) / LOWEST_MM) if error < HIGHEST_MM else 32
+            end = start["error_mm"]
+            step = 8 * math.log10(max(end, LOWEST_MM) / LOWEST_MM) if end < HIGHEST_MM else 32
             counts[min(32, int(step + 1e-9))] += 1
         ends = [*edges, 10 * HIGHEST_MM]
         for count, low, high in zip(counts, ends, ends[1:]):

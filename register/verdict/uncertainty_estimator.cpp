@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
 #include "base/error.h"
+#include "geometry/target_box.h"
 #include "register/problem/pose_target.h"
 #include "register/verdict/calibration.h"
 #include "register/verdict/pose_covariance.h"
@@ -107,14 +107,9 @@ double UncertaintyEstimator::add_covariance(const RegistrationResult& result,
   const PredictedTre tre = predicted_tre(of_target, frame, target_ct);
   report.tre_rms_mm = tre.rms_mm;
   report.tre_95_mm = tre.upper_95_mm;
-  if (views_.size() == 1) {
-    const Eigen::Vector3d center_ct_mm =
-        std::accumulate(
-            target_ct.begin(), target_ct.end(), Eigen::Vector3d(Eigen::Vector3d::Zero())) /
-        static_cast<double>(target_ct.size());
+  if (views_.size() == 1)
     report.depth_95_mm =
-        depth_95_mm(of_target, frame, center_ct_mm, views_.front().camera.source_point);
-  }
+        depth_95_mm(of_target, frame, mean_point(target_ct), views_.front().camera.source_point);
   return predicted_tre(*sandwich, frame, target_ct).rms_mm;
 }
 

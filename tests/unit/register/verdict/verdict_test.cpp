@@ -9,10 +9,12 @@
 #include <memory>
 #include <utility>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "base/hash_random.h"
 #include "register/verdict/pose_examiner.h"
+#include "register/verdict/registration.h"
 #include "register/verdict/view_diagnosis.h"
 #include "unit/register/method/narrow_drr.h"
 #include "unit/register/method/registration_cases.h"
@@ -33,6 +35,30 @@ TEST(Judgement, AFoundPoseIsGoodInEveryView) {
   EXPECT_EQ(verdict_of({{0.7, 0.6}, {0.6, 0.29}}), Verdict::Doubtful);
   EXPECT_EQ(verdict_of({{0.7, 0.6}, {0.0, 0.0}}), Verdict::Doubtful);
   EXPECT_EQ(verdict_of({{0.7, 0.6}}), Verdict::Found);
+}
+
+RegistrationRecord record_of(const std::vector<ViewValue>& values, double depth_95_mm) {
+  RegistrationRecord record;
+  record.result.stop_reason = StopReason::StepBelowFinal;
+  record.view_values = values;
+  record.uncertainty.depth_95_mm = depth_95_mm;
+  return record;
+}
+
+TEST(Judgement, OfOneViewSaysWhatIsNotKnown) {
+  const auto reason = [](double depth_95_mm) {
+    return judgement_of(record_of({{0.7, 0.6}}, depth_95_mm)).reason;
+  };
+  EXPECT_THAT(reason(24.0), testing::EndsWith("in detail; depth along the beam within 24 mm"));
+  EXPECT_THAT(reason(23.01), testing::EndsWith("depth along the beam within 24 mm"));
+  EXPECT_THAT(reason(9.91), testing::EndsWith("depth along the beam within 10 mm"));
+  EXPECT_THAT(reason(0.01), testing::EndsWith("depth along the beam within 0.1 mm"));
+  EXPECT_THAT(reason(std::nan("")), testing::EndsWith("depth along the beam not known"));
+  EXPECT_EQ(judgement_of(record_of({{0.7, 0.6}}, 24.0)).verdict, Verdict::Found);
+  for (const std::vector<ViewValue>& values :
+       {std::vector<ViewValue>{{0.7, 0.6}, {0.6, 0.5}}, std::vector<ViewValue>{{0.0, 0.0}}})
+    EXPECT_THAT(judgement_of(record_of(values, 24.0)).reason,
+                testing::Not(testing::HasSubstr("along the beam")));
 }
 
 TEST(Judgement, APoseThatExplainsNextToNothingIsNotFound) {
