@@ -267,7 +267,8 @@ def paired_text(paired):
 def case_table(renderers):
     rows = [[entry["case"], method_name(renderer["renderer"]), whole(entry["starts"]), rate(entry), capture(entry["capture_range"]),
              entry["error"], three(entry["error_of_successes_mm"]["mean"]), depth_text(entry["depth_of_all_mm"]),
-             three(entry["gold_uncertainty_mm"]), milliseconds(entry["seconds"]["median"]), three(entry["evaluations"]["median"])] for renderer in renderers for entry in renderer["cases"]]
+             three(entry["gold_uncertainty_mm"]), milliseconds(entry["seconds"]["median"]), three(entry["evaluations"]["median"])]
+            for renderer in renderers for entry in renderer["cases"]]
     return Table(["Case", "Method", "#Starts", "#Success (95 % interval)", "#Capture range", "by", "#Mean error of successes (mm)",
                   "#Depth off: median, 95th percentile (mm)", "#Gold standard by itself (mm)", "#Median ms", "#Median evaluations"], rows,
                  "Per case: a patient, or one of a patient's poses (the paper's Table II)")

@@ -178,8 +178,8 @@ def population_markdown(rows):
                       f"{'>= ' if number('patients_capture_lower_bounds') > 0 else ''}{own} ({low} to {high})",
                       fixed(number("median_error_mm"), 2), f"{fixed(number('median_depth_mm'), 1)}, {fixed(number('p95_depth_mm'), 1)}",
                       fixed(number("median_seconds"), 3)])
-    return markdown(["Condition", "Group", "Patients, of whom lost a start", "Starts", "Error", "Success, %", "Bootstrap", "Student's", "Below 1 / 5 mm, %",
-                     "Capture range of all, mm", "Patients' own, mean, mm", "Median error, mm",
+    return markdown(["Condition", "Group", "Patients, of whom lost a start", "Starts", "Error", "Success, %", "Bootstrap", "Student's",
+                     "Below 1 / 5 mm, %", "Capture range of all, mm", "Patients' own, mean, mm", "Median error, mm",
                      "Depth off, one view, mm: median, 95th percentile", "Seconds"], lines)
 
 
