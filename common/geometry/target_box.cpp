@@ -44,6 +44,12 @@ std::vector<Eigen::Vector3d> target_points(const CtBox& box, double max_spacing_
   return points;
 }
 
+Eigen::Vector3d mean_point(std::span<const Eigen::Vector3d> points) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& point : points) sum += point;
+  return sum / static_cast<double>(points.size());
+}
+
 double rms_radius_mm(const CtBox& box, const Eigen::Vector3d& center_ct_mm) {
   const Eigen::Vector3d offset = (box.low_mm + box.high_mm) / 2.0 - center_ct_mm;
   // The variance of a uniform distribution over a side L is L^2 / 12.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,9 @@ std::string target_box_problem(const CtBox& box, double max_spacing_mm = kTarget
 /// target_box_problem() complains of. \test TargetBox.PointsAreTheCentresOfEqualCells
 std::vector<Eigen::Vector3d> target_points(const CtBox& box,
                                            double max_spacing_mm = kTargetPointSpacingMm);
+
+/// Mean of at least one point. \test TargetBox.CenterIsTheMeanOfItsPoints
+Eigen::Vector3d mean_point(std::span<const Eigen::Vector3d> points);
 
 /// Root mean square distance (mm) of the box's points from `center_ct_mm`, exact: what turns a
 /// rotation about that point into a distance.

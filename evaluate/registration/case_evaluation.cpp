@@ -22,6 +22,7 @@
 #include "figures/picture.h"
 #include "figures/study_pictures.h"
 #include "files/foreign_file.h"
+#include "files/number_json.h"
 #include "files/options_toml.h"
 #include "files/output_file.h"
 #include "files/sha256.h"
@@ -166,7 +167,7 @@ TracedRow traced_row(Method& method,
       yardstick);
   row.renderer = method.renderer;
   row.start_index = index;
-  if (!row.is_right(method.success_tre_mm))
+  if (!row.is_success(method.success_tre_mm))
     traced.trace = trace_points(trace, method.problem().frame(), yardstick);
   return traced;
 }
@@ -300,17 +301,18 @@ struct ChosenRow {
 /// Rank 0: the rows of the best, median and worst registration of a method; none when none has a
 /// pose. Rows are visited twice instead of held: memory holds fields at this point.
 std::vector<ChosenRow> chosen_rows(const MethodRows& method) {
-  std::vector<std::pair<double, std::int64_t>> by_tre;
+  std::vector<std::pair<double, std::int64_t>> by_error;
   method.visit([&](std::int64_t index, const TracedRow& traced) {
-    if (std::isfinite(traced.row.tre_mm)) by_tre.emplace_back(traced.row.tre_mm, index);
+    const double error_mm = traced.row.decisive_mm();
+    if (std::isfinite(error_mm)) by_error.emplace_back(error_mm, index);
   });
-  if (by_tre.empty()) return {};
-  std::sort(by_tre.begin(), by_tre.end());
-  by_tre.erase(std::unique(by_tre.begin(), by_tre.end()), by_tre.end());
+  if (by_error.empty()) return {};
+  std::sort(by_error.begin(), by_error.end());
+  by_error.erase(std::unique(by_error.begin(), by_error.end()), by_error.end());
   const std::array<std::pair<const char*, std::int64_t>, 3> wanted = {
-      {{"best", by_tre.front().second},
-       {"median", by_tre[(by_tre.size() - 1) / 2].second},
-       {"worst", by_tre.back().second}}};
+      {{"best", by_error.front().second},
+       {"median", by_error[(by_error.size() - 1) / 2].second},
+       {"worst", by_error.back().second}}};
   std::vector<ChosenRow> chosen;
   chosen.reserve(wanted.size());
   for (const auto& [which, index] : wanted) chosen.push_back({which, {}});
@@ -340,7 +342,8 @@ void draw_overlays(const Method& method,
       registration::write_overlay(view,
                                   pose,
                                   evaluation.case_name + ", view " + camera + ", " + which +
-                                      " result: TRE " + fixed_text(row.tre_mm, 2) + " mm",
+                                      " result: " + row.decisive_name() + " " +
+                                      fixed_text(row.decisive_mm(), 2) + " mm",
                                   folder / name);
       evaluation.pictures.push_back({{"file", name},
                                      {"case", evaluation.case_name},
@@ -350,6 +353,9 @@ void draw_overlays(const Method& method,
                                      {"renderer", row.renderer},
                                      {"start_index", row.start_index},
                                      {"initial_tre_mm", row.initial_tre_mm},
+                                     {"error", row.decisive_name()},
+                                     {"error_mm", row.decisive_mm()},
+                                     {"depth_mm", number_json(row.errors.depth_mm)},
                                      {"tre_mm", row.tre_mm}});
       nlohmann::json outlines = evaluation.pictures.back();
       outlines["file"] = file_name_part(evaluation.case_name) + "-" + which + "-" +
@@ -488,6 +494,7 @@ RegistrationRow registered_row(
     const Yardstick& yardstick) {
   RegistrationRow row;
   set_start(start, row);
+  row.has_one_view = yardstick.has_one_view();
   try {
     const RegistrationRecord record = run(start.room_from_ct);
     set_result(record, row);

@@ -15,8 +15,10 @@ using nlohmann::json;
 CsvTable case_table(const json& renderers) {
   std::vector<CsvCells> rows;
   const auto add = [&](const json& renderer, const std::string& name, const json& part) {
-    const json& successes = part.at("tre_of_successes_mm");
-    const json& all = part.at("tre_of_all_mm");
+    const json& successes = part.at("error_of_successes_mm");
+    const auto of_all = [&](const char* error, const char* quantile) {
+      return number_of(part.at(error + std::string("_of_all_mm")).at(quantile));
+    };
     const json& range = part.at("capture_range");
     rows.push_back(
         {{"renderer", renderer.at("renderer").get<std::string>()},
@@ -24,12 +26,16 @@ CsvTable case_table(const json& renderers) {
          {"starts", part.at("starts").dump()},
          {"successes", part.at("successes").dump()},
          {"success_rate", number_of(part.at("rate"))},
-         {"mean_tre_of_successes_mm", number_of(successes.at("mean"))},
-         {"sd_tre_of_successes_mm", number_of(successes.at("sd"))},
-         {"median_tre_of_all_mm", number_of(all.at("median"))},
-         {"p95_tre_of_all_mm", number_of(all.at("p95"))},
+         {"error", part.at("error").get<std::string>()},
+         {"mean_error_of_successes_mm", number_of(successes.at("mean"))},
+         {"sd_error_of_successes_mm", number_of(successes.at("sd"))},
+         {"median_error_of_all_mm", of_all("error", "median")},
+         {"p95_error_of_all_mm", of_all("error", "p95")},
+         {"median_tre_of_all_mm", of_all("tre", "median")},
+         {"p95_tre_of_all_mm", of_all("tre", "p95")},
+         {"median_depth_of_all_mm", of_all("depth", "median")},
+         {"p95_depth_of_all_mm", of_all("depth", "p95")},
          {"gross_failures", part.at("gross_failures").at("successes").dump()},
-         {"mrpd_successes", part.at("mrpd_success").at("successes").dump()},
          {"capture_range_mm", range.is_object() ? number_of(range.at("initial_tre_mm")) : kNan},
          {"capture_range_ended_by",
           range.is_object() ? range.at("ended_by").get<std::string>() : ""}});

@@ -8,7 +8,8 @@
 namespace af::evaluation {
 
 /// The paper's Table II, cases.csv: a row per method and case, and one over all cases ("all"), of
-/// the "renderers" of summary.json. TREs in mm; failures stay in rates and in the last columns.
+/// the "renderers" of summary.json. Errors in mm (`error`: RegistrationRow::decisive_mm(), which
+/// success is by; `depth` of one view, else nan); failures stay in rates and in the last columns.
 CsvTable case_table(const nlohmann::json& renderers);
 
 /// starts-per-interval.csv: how the starts of every case and interval were drawn, of the "cases"

@@ -25,7 +25,8 @@ void CompareOptions::describe(Fields& field) {
         "Also the distance between the end poses of every two methods from the same starts (mean "
         "over the target box: median, 95th percentile, maximum) and the rotation between them for "
         "every patient, and the mean distance over patients with intervals, as further tables and "
-        "as CSVs, ...-pose-distances.csv and ...-pose-distances-over-patients.csv");
+        "as CSVs, ...-pose-distances.csv and ...-pose-distances-over-patients.csv. Runs of "
+        "different X-rays are refused");
   field("equivalence_margin_mm",
         equivalence_margin_mm,
         "With --pose-distances: two methods count as equivalent when their ends lie closer "

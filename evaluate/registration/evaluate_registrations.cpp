@@ -265,14 +265,21 @@ void write_traces(const std::filesystem::path& folder,
       }
 }
 
-/// The mean TRE of successes beside the gold standard's own error; empty without a success.
+/// The mean error of successes beside the gold standard's own, and how deep one view's lie from the
+/// truth; empty without a success.
 std::string mean_text(const json& renderer) {
-  const double mean_mm = number_of(renderer["tre_of_successes_mm"]["mean"]);
+  const double mean_mm = number_of(renderer["error_of_successes_mm"]["mean"]);
   const double gold_mm = number_of(renderer["gold_uncertainty_mm"]);
+  const json& depth_mm = renderer["depth_of_successes_mm"];
   if (!std::isfinite(mean_mm)) return "";
-  return ", mean TRE of these " + fixed_text(mean_mm, 2) + " mm" +
-         (std::isfinite(gold_mm) ? " (gold standard by itself: " + fixed_text(gold_mm, 2) + " mm)"
-                                 : "");
+  std::string text = ", mean " + renderer["error"].get<std::string>() + " of these " +
+                     fixed_text(mean_mm, 2) + " mm";
+  if (std::isfinite(gold_mm))
+    text += " (gold standard by itself: " + fixed_text(gold_mm, 2) + " mm)";
+  if (depth_mm["count"] != 0)
+    text += ", depth off by " + fixed_text(number_of(depth_mm["median"]), 2) + " mm (median), " +
+            fixed_text(number_of(depth_mm["p95"]), 2) + " mm (95th percentile)";
+  return text;
 }
 
 void print_outcome(const json& summary,
@@ -281,7 +288,8 @@ void print_outcome(const json& summary,
   for (const json& renderer : summary["renderers"]) {
     std::cout << renderer["renderer"].get<std::string>() << ": "
               << renderer["successes"].get<std::int64_t>() << " of "
-              << renderer["starts"].get<std::int64_t>() << " starts succeeded (TRE < "
+              << renderer["starts"].get<std::int64_t>() << " starts succeeded ("
+              << renderer["error"].get<std::string>() << " < "
               << number_text(number_of(summary["success_tre_mm"])) << " mm)";
     std::cout << mean_text(renderer);
     const double seconds = number_of(renderer["seconds"]["median"]);
@@ -408,7 +416,7 @@ void describe_methods(Fields& field, RegistrationStudyOptions& options) {
       .not_deciding("rows do not depend on it");
   field("success_tre_mm",
         options.success_tre_mm,
-        "A registration that ends below this TRE succeeded, mm")
+        "A registration that ends below this TRE, with one view below this mRPD, succeeded, mm")
       .above(0.0)
       .finite();
 }

@@ -17,6 +17,7 @@ namespace af::evaluation {
 struct FinishedCase {
   PoseFrame gold_frame;  ///< what the poses of its rows are relative to
   CtBox target_box_ct;   ///< what distances are means over
+  bool has_one_view;
 };
 
 /// What is needed to read a run's rows.
@@ -33,9 +34,11 @@ struct RunFacts {
 RunFacts facts_of(const EvaluationRun& run);
 
 /// Calls `receive` with the rows of registrations.csv in order: case, renderer, start index, poses,
-/// TREs, mRPD, error of the rotation, DRRs and seconds; the rest is left as it is without a
-/// registration. FileError when one of these is missing or no number.
+/// TREs, mRPD, one view's depth, error of the rotation, DRRs and seconds; the rest is left as it is
+/// without a registration. `facts`: of the run. FileError when one of these is missing or no
+/// number.
 void read_rows(const EvaluationRun& run,
+               const RunFacts& facts,
                const std::function<void(const RegistrationRow& row)>& receive);
 
 }  // namespace af::evaluation

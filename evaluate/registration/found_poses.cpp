@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluate/registration/found_poses.h"
 
-#include <cmath>
+#include <filesystem>
 
 #include "evaluate/registration/start_tables.h"
+#include "files/sha256.h"
 
 namespace af::evaluation {
 namespace {
 
 RegistrationRow found_row(const FoundPoses& found, std::int64_t index, const Yardstick& yardstick) {
   RegistrationRow row;
+  row.has_one_view = yardstick.has_one_view();
   row.seconds = RegistrationRow::kMissing;
   row.stop_reason = "no-pose";
   if (const auto seconds = found.seconds.find(index); seconds != found.seconds.end())
@@ -48,6 +50,11 @@ CaseEvaluation evaluate_found_poses(const RegistrationStudyOptions& options,
                                     std::vector<RegistrationRow>& rows) {
   CaseEvaluation evaluation;
   evaluation.case_name = study_case.name;
+  // Nothing reads the X-rays, which need not be there.
+  for (const StudyView& view : study_case.views)
+    if (std::filesystem::is_regular_file(view.xray))
+      evaluation.inputs.identities[study_case.name + ": xray " + view.camera] =
+          sha256_of_file(view.xray.string());
   evaluation.gold = gold_standard(study, study_case, options.gold);
   const Yardstick yardstick = yardstick_of(study, study_case, evaluation.gold);
   StartMeasures measures(start_frame(study_case, yardstick),

@@ -37,9 +37,10 @@ struct Band {
 struct Sums {
   std::array<Band, kBands> bands{};
   Eigen::Matrix<double, 6, 1> parameters = Eigen::Matrix<double, 6, 1>::Zero();  ///< of successes
-  std::vector<double> tre_mm;                                                    ///< of successes
-  std::vector<double> rotation_error_deg;                                        ///< of successes
-  std::vector<double> mrpd_mm;  ///< of those below the threshold by mRPD
+  std::vector<double> error_mm;                                                  ///< of successes
+  std::vector<double> depth_mm;            ///< of successes of one view
+  std::vector<double> rotation_error_deg;  ///< of successes
+  const char* error = "";                  ///< RegistrationRow::decisive_name()
   std::int64_t gross_failures = 0;
   std::int64_t starts = 0;
   std::vector<double> drr_counts;
@@ -55,8 +56,8 @@ double rotation_share_of(const RegistrationRow& row, const RunFacts& facts) {
 void add_row(const RegistrationRow& row, const RunFacts& facts, Sums& sums) {
   const bool is_success = row.is_success(facts.success_tre_mm);
   ++sums.starts;
-  sums.gross_failures += row.tre_mm < kGrossFailureMm ? 0 : 1;
-  if (row.errors.mrpd_mm < facts.success_tre_mm) sums.mrpd_mm.push_back(row.errors.mrpd_mm);
+  sums.error = row.decisive_name();
+  sums.gross_failures += row.decisive_mm() < kGrossFailureMm ? 0 : 1;
   for (std::size_t band = 0; band < kBands; ++band) {
     if (!(row.initial_tre_mm >= kBandEndsMm[band] && row.initial_tre_mm < kBandEndsMm[band + 1]))
       continue;
@@ -67,7 +68,8 @@ void add_row(const RegistrationRow& row, const RunFacts& facts, Sums& sums) {
   sums.drr_counts.push_back(static_cast<double>(row.drr_count));
   if (std::isfinite(row.seconds)) sums.seconds.push_back(row.seconds);
   if (!is_success) return;
-  sums.tre_mm.push_back(row.tre_mm);
+  sums.error_mm.push_back(row.decisive_mm());
+  if (row.has_one_view) sums.depth_mm.push_back(row.errors.depth_mm);
   if (std::isfinite(row.errors.rotation_deg))
     sums.rotation_error_deg.push_back(row.errors.rotation_deg);
   sums.parameters += Eigen::Map<const Eigen::Matrix<double, 6, 1>>(row.final_deg_mm.data());
@@ -125,16 +127,18 @@ CsvCells cells_of(const EvaluationRun& run,
            cells);
   }
   // NaN without a success: 0 / 0.
-  const auto successes = static_cast<double>(sums.tre_mm.size());
-  const SampleSummary tre = summarize(sums.tre_mm);
-  append({{"mean_tre_mm", tre.mean},
-          {"median_tre_mm", tre.median},
+  const auto successes = static_cast<double>(sums.error_mm.size());
+  const SampleSummary error = summarize(sums.error_mm);
+  const SampleSummary depth = summarize(sums.depth_mm);
+  append({{"error", sums.error},
+          {"mean_error_mm", error.mean},
+          {"median_error_mm", error.median},
+          {"median_depth_mm", depth.median},
+          {"p95_depth_mm", depth.percentile_95},
           {"rotation_bias_deg", sums.parameters.head<3>().norm() / successes},
           {"translation_bias_mm", sums.parameters.tail<3>().norm() / successes},
           {"median_rotation_error_deg", summarize(sums.rotation_error_deg).median},
           {"gross_failures", sums.gross_failures},
-          {"mrpd_successes", sums.mrpd_mm.size()},
-          {"median_mrpd_mm", summarize(sums.mrpd_mm).median},
           {"capture_range_mm", capture_range_of(run, case_name, renderer)},
           {"median_drr_count", summarize(sums.drr_counts).median},
           {"median_seconds", summarize(sums.seconds).median}},
@@ -142,10 +146,15 @@ CsvCells cells_of(const EvaluationRun& run,
   return cells;
 }
 
+/// A test's p, or why it was not made.
+std::string test_text(const json& p, const json& needed, const std::string& what) {
+  return p.is_number() ? number_text(number_of(p)) : "fewer than " + needed.dump() + " " + what;
+}
+
 std::string claim_text(const json& ends) {
   const json& is_equivalent = ends.at("is_equivalent");
   if (is_equivalent.is_null())
-    return "not claimed: fewer than " + ends.at("cases_needed").dump() + " patients";
+    return "not claimed: " + test_text(ends.at("p"), ends.at("cases_needed"), "patients");
   return is_equivalent.get<bool>() ? "yes" : "not shown";
 }
 
@@ -156,7 +165,7 @@ CsvTable methods_table(const std::vector<EvaluationRun>& runs) {
   for (const EvaluationRun& run : runs) {
     const RunFacts facts = facts_of(run);
     std::map<std::pair<std::string, std::string>, Sums> sums;
-    read_rows(run, [&](const RegistrationRow& row) {
+    read_rows(run, facts, [&](const RegistrationRow& row) {
       add_row(row, facts, sums[{row.case_name, row.renderer}]);
     });
     try {
@@ -178,29 +187,30 @@ CsvTable pairs_table(const std::vector<EvaluationRun>& runs) try {
   std::vector<CsvCells> rows;
   for (const EvaluationRun& run : runs) {
     const json& pairs = run.summary.at("field_against_raycast");
-    if (!pairs.is_object() || !pairs.contains("test")) continue;
+    if (!pairs.is_object()) continue;
     const json& ends = pairs.at("end_distance_mm");
     const json& over = ends.at("over_cases");
-    rows.push_back({{"run", run.folder.filename().string()},
-                    {"common_starts", pairs.at("common_starts").dump()},
-                    {"successes_field", pairs.at("successes").at(0).dump()},
-                    {"successes_raycast", pairs.at("successes").at(1).dump()},
-                    {"pairs", pairs.at("pairs").dump()},
-                    {"patients", over.at("cases").dump()},
-                    {"mean_distance_mm", number_of(over.at("mean"))},
-                    {"bootstrap_low_mm", number_of(over.at("low"))},
-                    {"bootstrap_high_mm", number_of(over.at("high"))},
-                    {"student_low_mm", number_of(over.at("student_low"))},
-                    {"student_high_mm", number_of(over.at("student_high"))},
-                    {"p95_distance_mm", number_of(ends.at("pairs").at("p95"))},
-                    {"max_distance_mm", number_of(ends.at("pairs").at("max"))},
-                    {"margin_mm", number_of(ends.at("margin_mm"))},
-                    {"claim", claim_text(ends)},
-                    {"p", number_of(ends.at("p"))},
-                    {"tre_difference_mm", number_of(pairs.at("test").at("mean_difference_mm"))},
-                    {"mcnemar_p", number_of(pairs.at("mcnemar_p"))},
-                    {"median_seconds_field", number_of(pairs.at("median_seconds").at(0))},
-                    {"median_seconds_raycast", number_of(pairs.at("median_seconds").at(1))}});
+    rows.push_back(
+        {{"run", run.folder.filename().string()},
+         {"common_starts", pairs.at("common_starts").dump()},
+         {"successes_field", pairs.at("successes").at(0).dump()},
+         {"successes_raycast", pairs.at("successes").at(1).dump()},
+         {"pairs", pairs.at("pairs").dump()},
+         {"patients", over.at("cases").dump()},
+         {"mean_distance_mm", number_of(over.at("mean"))},
+         {"bootstrap_low_mm", number_of(over.at("low"))},
+         {"bootstrap_high_mm", number_of(over.at("high"))},
+         {"student_low_mm", number_of(over.at("student_low"))},
+         {"student_high_mm", number_of(over.at("student_high"))},
+         {"p95_distance_mm", number_of(ends.at("pairs").at("p95"))},
+         {"max_distance_mm", number_of(ends.at("pairs").at("max"))},
+         {"margin_mm", number_of(ends.at("margin_mm"))},
+         {"claim", claim_text(ends)},
+         {"p", test_text(ends.at("p"), ends.at("cases_needed"), "patients")},
+         {"error_difference_mm", number_of(pairs.at("mean_difference_mm"))},
+         {"mcnemar_p", test_text(pairs.at("mcnemar_p"), pairs.at("pairs_needed"), "pairs")},
+         {"median_seconds_field", number_of(pairs.at("median_seconds").at(0))},
+         {"median_seconds_raycast", number_of(pairs.at("median_seconds").at(1))}});
   }
   return csv_table(std::move(rows));
 } catch (const json::exception&) {

@@ -16,16 +16,17 @@ namespace af::evaluation {
 ///   renderer, starts;
 /// - for starts 0 to 8, 8 to 16 and 16 to 30 mm from gold their number, the successes, Wilson's
 ///   interval of their rate, and the mean rotation_share() of the starts, NaN without starts;
-/// - of successes the mean and the median TRE, the length of the mean signed rotation and
-///   translation, and the median rotation;
-/// - of all starts gross_failures (a TRE of 10 mm or more, or no pose), and how many have an mRPD
-///   below the threshold, with the median of these: to be read with one view, which shows no depth;
+/// - error, by which ends are counted (RegistrationRow::decisive_name()); of successes its mean and
+///   median, of one view the median and the 95th percentile of how far depth is off, the length of
+///   the mean signed rotation and translation, and the median rotation;
+/// - of all starts gross_failures (an error of 10 mm or more, or no pose);
 /// - the case's own capture range, "at least 16" where the study ends first, "-" where no start
 ///   lies in an interval; medians over all starts of DRRs and seconds.
 CsvTable methods_table(const std::vector<EvaluationRun>& runs);
 
 /// Field against ray casting from the same starts, a row per run that has both: success, the
 /// distance between the two end poses with intervals over patients, and what is claimed of it.
+/// Where a test was not made for want of pairs, it says so in place of p.
 CsvTable pairs_table(const std::vector<EvaluationRun>& runs);
 
 }  // namespace af::evaluation

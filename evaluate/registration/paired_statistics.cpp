@@ -60,42 +60,21 @@ std::vector<StartPair> pairs_of(std::span<const RegistrationRow> rows) {
   return pairs;
 }
 
-json test_json(const std::vector<double>& field_tre_mm,
-               const std::vector<double>& raycast_tre_mm,
-               double margin_mm) {
-  const PairedComparison comparison = compare_paired(field_tre_mm, raycast_tre_mm, margin_mm);
-  std::vector<double> differences;
-  for (std::size_t i = 0; i < field_tre_mm.size(); ++i)
-    differences.push_back(field_tre_mm[i] - raycast_tre_mm[i]);
-  const SignedRankTest ranks = signed_rank_test(differences);
-  const double sd = comparison.standard_error * std::sqrt(static_cast<double>(comparison.pairs));
-  return {{"mean_difference_mm", comparison.mean_difference},
-          {"sd_mm", sd},
-          {"low_90_mm", comparison.low_90},
-          {"high_90_mm", comparison.high_90},
-          {"t_test_p", comparison.t_test_p},
-          {"signed_rank_p", ranks.p},
-          {"signed_rank_is_exact", ranks.is_exact},
-          {"margin_mm", comparison.margin},
-          {"equivalence_p", comparison.equivalence_p},
-          {"equivalence_power", comparison.equivalence_power},
-          {"pairs_for_power_90", pairs_for_equivalence(sd, margin_mm)}};
-}
-
 /// Sums over the pairs of one patient.
 struct PatientPairs {
-  CaseMean tre_difference_mm;   ///< field less ray casting, where both succeeded
-  CaseMean success_difference;  ///< field less ray casting, every common start
-  CaseMean end_distance_mm;     ///< where both succeeded
+  CaseMean error_difference_mm;  ///< field less ray casting, where both succeeded
+  CaseMean success_difference;   ///< field less ray casting, every common start
+  CaseMean end_distance_mm;      ///< where both succeeded
 };
 
 /// All pairs of a run.
 struct PairSums {
   std::array<std::vector<double>, 2> seconds;
-  std::vector<double> field_tre_mm;      ///< where both succeeded
-  std::vector<double> raycast_tre_mm;    ///< the same
-  std::vector<double> distances_mm;      ///< the same
-  std::vector<double> all_distances_mm;  ///< where both have an end pose
+  std::vector<double> field_error_mm;        ///< where both succeeded
+  std::vector<double> raycast_error_mm;      ///< the same
+  std::vector<double> error_differences_mm;  ///< the same: field less ray casting
+  std::vector<double> distances_mm;          ///< the same
+  std::vector<double> all_distances_mm;      ///< where both have an end pose
   std::int64_t only_field = 0;
   std::int64_t only_raycast = 0;
   std::map<std::string, PatientPairs> patients;
@@ -107,8 +86,8 @@ void PairSums::add(const StartPair& pair, const PairedOptions& options) {
   PatientPairs& of_patient = patients[patient_of_case(pair.field->case_name)];
   seconds[0].push_back(pair.field->seconds);
   seconds[1].push_back(pair.raycast->seconds);
-  const bool field = pair.field->is_right(options.success_tre_mm);
-  const bool raycast = pair.raycast->is_right(options.success_tre_mm);
+  const bool field = pair.field->is_success(options.success_tre_mm);
+  const bool raycast = pair.raycast->is_success(options.success_tre_mm);
   only_field += field && !raycast ? 1 : 0;
   only_raycast += raycast && !field ? 1 : 0;
   of_patient.success_difference.sum += (field ? 1.0 : 0.0) - (raycast ? 1.0 : 0.0);
@@ -117,14 +96,32 @@ void PairSums::add(const StartPair& pair, const PairedOptions& options) {
       options.end_distance_mm ? options.end_distance_mm(*pair.field, *pair.raycast) : kNan;
   if (std::isfinite(distance_mm)) all_distances_mm.push_back(distance_mm);
   if (!field || !raycast) return;
-  field_tre_mm.push_back(pair.field->tre_mm);
-  raycast_tre_mm.push_back(pair.raycast->tre_mm);
-  of_patient.tre_difference_mm.sum += pair.field->tre_mm - pair.raycast->tre_mm;
-  of_patient.tre_difference_mm.count += 1.0;
+  field_error_mm.push_back(pair.field->decisive_mm());
+  raycast_error_mm.push_back(pair.raycast->decisive_mm());
+  error_differences_mm.push_back(field_error_mm.back() - raycast_error_mm.back());
+  of_patient.error_difference_mm.sum += error_differences_mm.back();
+  of_patient.error_difference_mm.count += 1.0;
   if (!std::isfinite(distance_mm)) return;
   distances_mm.push_back(distance_mm);
   of_patient.end_distance_mm.sum += distance_mm;
   of_patient.end_distance_mm.count += 1.0;
+}
+
+json test_json(const PairSums& sums, double margin_mm) {
+  const PairedComparison comparison =
+      compare_paired(sums.field_error_mm, sums.raycast_error_mm, margin_mm);
+  const SignedRankTest ranks = signed_rank_test(sums.error_differences_mm);
+  const double sd = comparison.standard_error * std::sqrt(static_cast<double>(comparison.pairs));
+  return {{"sd_mm", sd},
+          {"low_90_mm", comparison.low_90},
+          {"high_90_mm", comparison.high_90},
+          {"t_test_p", comparison.t_test_p},
+          {"signed_rank_p", ranks.p},
+          {"signed_rank_is_exact", ranks.is_exact},
+          {"margin_mm", comparison.margin},
+          {"equivalence_p", comparison.equivalence_p},
+          {"equivalence_power", comparison.equivalence_power},
+          {"pairs_for_power_90", pairs_for_equivalence(sd, margin_mm)}};
 }
 
 /// One of the means of every patient that has it.
@@ -170,7 +167,7 @@ json end_distance_json(const PairSums& sums, const PairedOptions& options) {
                  {"all", to_json(summarize(sums.all_distances_mm))},
                  {"over_cases", over_cases},
                  {"margin_mm", options.margin_mm},
-                 {"p", number_json(found.p)},
+                 {"p", found.has_enough_cases() ? number_json(found.p) : json(nullptr)},
                  {"cases_needed", kEnoughCasesForEquivalence},
                  {"cases_without_pairs", patients_without_pairs},
                  {"success_margin", kSuccessMargin},
@@ -188,20 +185,25 @@ json paired_statistics(std::span<const RegistrationRow> rows, const PairedOption
   PairSums sums;
   for (const StartPair& pair : pairs_of(rows)) sums.add(pair, options);
   if (sums.seconds[0].empty()) return nullptr;
-  const auto both = static_cast<std::int64_t>(sums.field_tre_mm.size());
+  const auto both = static_cast<std::int64_t>(sums.field_error_mm.size());
   json result = {
       {"common_starts", sums.seconds[0].size()},
       {"successes", {both + sums.only_field, both + sums.only_raycast}},
-      {"mcnemar_p", mcnemar_exact_p(sums.only_field, sums.only_raycast)},
+      {"pairs_needed", kLeastPairsOfATest},
+      {"mcnemar_p",
+       sums.seconds[0].size() < kLeastPairsOfATest
+           ? json(nullptr)
+           : json(mcnemar_exact_p(sums.only_field, sums.only_raycast))},
       {"median_seconds", {summarize(sums.seconds[0]).median, summarize(sums.seconds[1]).median}},
       {"pairs", both}};
   result["success_difference_over_cases"] =
       interval_over_cases(means_of(sums.patients, &PatientPairs::success_difference), options.seed);
   if (options.end_distance_mm) result["end_distance_mm"] = end_distance_json(sums, options);
-  if (both >= 2)
-    result["test"] = test_json(sums.field_tre_mm, sums.raycast_tre_mm, options.margin_mm);
-  result["mean_difference_over_cases_mm"] =
-      interval_over_cases(means_of(sums.patients, &PatientPairs::tre_difference_mm), options.seed);
+  result["mean_difference_mm"] = number_json(mean_of(sums.error_differences_mm));
+  if (sums.error_differences_mm.size() >= kLeastPairsOfATest)
+    result["test"] = test_json(sums, options.margin_mm);
+  result["mean_difference_over_cases_mm"] = interval_over_cases(
+      means_of(sums.patients, &PatientPairs::error_difference_mm), options.seed);
   return result;
 }
 

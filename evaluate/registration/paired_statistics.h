@@ -25,9 +25,10 @@ struct PairedOptions {
 /// Field against ray casting on the starts that both were given: successes and median seconds of
 /// each, McNemar's test of success, and the difference of the patients' success rates with
 /// intervals over patients (patient_of_case()); on those from which both succeeded ("pairs"), the
-/// distance of their end poses with intervals and a test of equivalence over patients. Success is
-/// RegistrationRow::is_right(). Also, if there are two pairs or more, tests of
-/// the TREs' difference that take starts for independent. null when no start was given to both.
+/// distance of their end poses with intervals and a test of equivalence over patients, and the mean
+/// difference of RegistrationRow::decisive_mm(), which success is by, with tests of it that take
+/// starts for independent. No test is made of fewer than kLeastPairsOfATest starts or pairs. null
+/// when no start was given to both.
 nlohmann::json paired_statistics(std::span<const RegistrationRow> rows,
                                  const PairedOptions& options);
 

@@ -21,6 +21,7 @@ using RunOfCase = std::map<std::pair<std::string, std::string>, std::filesystem:
 
 void add_population_row(const RegistrationRow& row,
                         const std::filesystem::path& run,
+                        double success_mm,
                         RunOfCase& run_of_case,
                         PatientsByRenderer& found) {
   const auto [known, is_new] = run_of_case.emplace(std::pair(row.renderer, row.case_name), run);
@@ -32,8 +33,9 @@ void add_population_row(const RegistrationRow& row,
   const std::string patient = patient_of_case(row.case_name);
   PatientOutcomes& outcomes = found[row.renderer][patient];
   outcomes.patient = patient;
-  outcomes.by_tre.push_back({row.initial_tre_mm, row.tre_mm});
-  outcomes.by_mrpd.push_back({row.initial_tre_mm, row.errors.mrpd_mm});
+  outcomes.outcomes.push_back({row.initial_tre_mm, row.decisive_mm()});
+  if (row.has_one_view && row.is_success(success_mm))
+    outcomes.depth_mm.push_back(row.errors.depth_mm);
   outcomes.seconds.push_back(row.seconds);
 }
 
@@ -71,19 +73,22 @@ void PopulationReader::read(const std::string& condition) {
   if (equals == 0 || equals == std::string::npos)
     throw InputError("--condition", condition, "must be NAME=FOLDER");
   PatientsByRenderer found;
+  std::set<std::string> errors;
   std::set<std::string> commits;
   RunOfCase run_of_case;
   for (const EvaluationRun& run : find_runs({condition.substr(equals + 1)})) {
     check_counting(run);
     commits.insert(commit_of(run));
-    read_rows(run, [&](const RegistrationRow& row) {
-      add_population_row(row, run.folder, run_of_case, found);
+    const RunFacts facts = facts_of(run);
+    read_rows(run, facts, [&](const RegistrationRow& row) {
+      errors.insert(row.decisive_name());
+      add_population_row(row, run.folder, facts.success_tre_mm, run_of_case, found);
     });
   }
   if (found.empty())
     throw InputError("--condition", condition, "holds no finished registration run");
   for (auto& [renderer, patients] : found) {
-    PopulationCondition one{condition.substr(0, equals), {}, commits};
+    PopulationCondition one{condition.substr(0, equals), {}, errors, commits};
     if (found.size() > 1) one.name += ", " + renderer;
     for (auto& [name, outcomes] : patients) one.patients.push_back(std::move(outcomes));
     conditions_.push_back(std::move(one));

@@ -17,8 +17,8 @@ namespace af::evaluation {
 struct PopulationCondition {
   std::string name;
   std::vector<PatientOutcomes> patients;
-  /// Of the programs that made the runs.
-  std::set<std::string> commits = {};
+  std::set<std::string> errors = {};   ///< RegistrationRow::decisive_name()
+  std::set<std::string> commits = {};  ///< of the programs that made the runs
 };
 
 /// Collects the conditions of a study of many patients.

@@ -10,10 +10,6 @@ namespace af::evaluation {
 
 namespace {
 
-const std::vector<TreOutcome>& ends_of(const PatientOutcomes& patient, CountedEnd end) {
-  return end == CountedEnd::Tre ? patient.by_tre : patient.by_mrpd;
-}
-
 std::vector<IntervalSuccess> intervals_of(const std::vector<TreOutcome>& outcomes,
                                           const PopulationCounting& counting) {
   return success_per_interval(
@@ -62,7 +58,6 @@ std::string half_of(const PatientOutcomes& patient) {
 }
 
 PopulationSuccess population_success(const std::vector<const PatientOutcomes*>& patients,
-                                     CountedEnd end,
                                      const PopulationCounting& counting) {
   PopulationSuccess result;
   std::vector<std::vector<IntervalSuccess>> own;  // per patient
@@ -70,7 +65,7 @@ PopulationSuccess population_success(const std::vector<const PatientOutcomes*>& 
   std::vector<CaseMean> rates;
   std::vector<CaseMean> ranges_mm;
   for (const PatientOutcomes* patient : patients) {
-    const std::vector<TreOutcome>& outcomes = ends_of(*patient, end);
+    const std::vector<TreOutcome>& outcomes = patient->outcomes;
     own.push_back(intervals_of(outcomes, counting));
     all.insert(all.end(), outcomes.begin(), outcomes.end());
     PatientSuccess success;

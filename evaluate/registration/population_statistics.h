@@ -23,8 +23,8 @@ struct PopulationCounting {
 /// The registrations of one patient in one condition: all true poses together.
 struct PatientOutcomes {
   std::string patient;
-  std::vector<TreOutcome> by_tre;
-  std::vector<TreOutcome> by_mrpd;  ///< the same starts, ends by mRPD: to be read with one view
+  std::vector<TreOutcome> outcomes;  ///< ends by RegistrationRow::decisive_mm()
+  std::vector<double> depth_mm;      ///< errors of successes of one view
   std::vector<double> seconds;
 
   /// The number at the end of the patient's name; 0: none, such as that of a real CT.
@@ -47,7 +47,7 @@ struct PatientSuccess {
   CaptureRange capture;
 };
 
-/// Success of a group of patients by one error. \test PopulationStatistics.OfHandMadePatients
+/// Success of a group of patients. \test PopulationStatistics.OfHandMadePatients
 struct PopulationSuccess {
   std::vector<PatientSuccess> patients;
   std::int64_t starts = 0;
@@ -66,10 +66,7 @@ struct PopulationSuccess {
   std::vector<CaseBootstrap> interval_bootstraps;
 };
 
-enum class CountedEnd { Tre, Mrpd };
-
 PopulationSuccess population_success(const std::vector<const PatientOutcomes*>& patients,
-                                     CountedEnd end,
                                      const PopulationCounting& counting);
 
 }  // namespace af::evaluation

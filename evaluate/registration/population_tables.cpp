@@ -21,24 +21,28 @@ PopulationGroup group_of(const PopulationCondition& condition,
                          const PopulationCounting& counting) {
   PopulationGroup group{condition.name,
                         name,
-                        population_success(patients, CountedEnd::Tre, counting),
-                        population_success(patients, CountedEnd::Mrpd, counting),
+                        joined(condition.errors, " or "),
+                        population_success(patients, counting),
                         joined(condition.commits, " ")};
-  std::vector<double> tre_mm;
+  std::vector<double> error_mm;
+  std::vector<double> depth_mm;
   std::vector<double> seconds;
   for (const PatientOutcomes* patient : patients) {
-    for (const TreOutcome& outcome : patient->by_tre)
-      if (outcome.tre_mm < counting.success_mm) tre_mm.push_back(outcome.tre_mm);
+    for (const TreOutcome& outcome : patient->outcomes)
+      if (outcome.error_mm < counting.success_mm) error_mm.push_back(outcome.error_mm);
+    depth_mm.insert(depth_mm.end(), patient->depth_mm.begin(), patient->depth_mm.end());
     for (const double value : patient->seconds)
       if (std::isfinite(value)) seconds.push_back(value);
   }
-  group.median_tre_mm = summarize(tre_mm).median;
+  group.median_error_mm = summarize(error_mm).median;
+  const SampleSummary depth = summarize(depth_mm);
+  group.median_depth_mm = depth.median;
+  group.p95_depth_mm = depth.percentile_95;
   group.median_seconds = summarize(seconds).median;
   return group;
 }
 
-/// What a row says of a group's success by one error.
-CsvCells success_of(const PopulationSuccess& success, const std::string& error) {
+CsvCells success_of(const PopulationSuccess& success) {
   double worst = 1.0;
   double smallest_mm = std::numeric_limits<double>::infinity();
   for (const PatientSuccess& patient : success.patients) {
@@ -48,30 +52,29 @@ CsvCells success_of(const PopulationSuccess& success, const std::string& error) 
   }
   const MeanOverCases& rate = success.rate;
   const MeanOverCases& own = success.capture_mm;
-  CsvCells cells = {{error + "successes", success.successes},
-                    {error + "rate", rate.value},
-                    {error + "student_low", rate.student.low},
-                    {error + "student_high", rate.student.high},
-                    {error + "bootstrap_low", rate.bootstrap.low},
-                    {error + "bootstrap_high", rate.bootstrap.high},
-                    {error + "worst_patient_rate", worst},
-                    {error + "capture_mm", success.pooled.initial_tre_mm},
-                    {error + "capture_ended_by", to_string(success.pooled.end)},
-                    {error + "capture_bootstrap_low_mm", success.pooled_interval_mm.low},
-                    {error + "capture_bootstrap_high_mm", success.pooled_interval_mm.high},
-                    {error + "patients_capture_mean_mm", own.value},
-                    {error + "patients_capture_student_low_mm", own.student.low},
-                    {error + "patients_capture_student_high_mm", own.student.high},
-                    {error + "patients_capture_bootstrap_low_mm", own.bootstrap.low},
-                    {error + "patients_capture_bootstrap_high_mm", own.bootstrap.high},
-                    {error + "patients_capture_smallest_mm", smallest_mm},
-                    {error + "patients_capture_lower_bounds", success.capture_lower_bounds},
-                    {error + "patients_with_failures", success.patients_with_failures},
-                    {error + "share_with_failures_low", success.share_with_failures.low},
-                    {error + "share_with_failures_high", success.share_with_failures.high}};
+  CsvCells cells = {{"successes", success.successes},
+                    {"rate", rate.value},
+                    {"student_low", rate.student.low},
+                    {"student_high", rate.student.high},
+                    {"bootstrap_low", rate.bootstrap.low},
+                    {"bootstrap_high", rate.bootstrap.high},
+                    {"worst_patient_rate", worst},
+                    {"capture_mm", success.pooled.initial_tre_mm},
+                    {"capture_ended_by", to_string(success.pooled.end)},
+                    {"capture_bootstrap_low_mm", success.pooled_interval_mm.low},
+                    {"capture_bootstrap_high_mm", success.pooled_interval_mm.high},
+                    {"patients_capture_mean_mm", own.value},
+                    {"patients_capture_student_low_mm", own.student.low},
+                    {"patients_capture_student_high_mm", own.student.high},
+                    {"patients_capture_bootstrap_low_mm", own.bootstrap.low},
+                    {"patients_capture_bootstrap_high_mm", own.bootstrap.high},
+                    {"patients_capture_smallest_mm", smallest_mm},
+                    {"patients_capture_lower_bounds", success.capture_lower_bounds},
+                    {"patients_with_failures", success.patients_with_failures},
+                    {"share_with_failures_low", success.share_with_failures.low},
+                    {"share_with_failures_high", success.share_with_failures.high}};
   for (std::size_t i = 0; i < kLadderMm.size(); ++i)
-    cells.emplace_back(error + "below_" + number_text(kLadderMm[i]) + "_mm",
-                       success.below_ladder[i]);
+    cells.emplace_back("below_" + number_text(kLadderMm[i]) + "_mm", success.below_ladder[i]);
   return cells;
 }
 
@@ -102,12 +105,14 @@ CsvTable population_table(const std::vector<PopulationGroup>& groups, double suc
   return csv_table(groups, [&](const PopulationGroup& group) {
     CsvCells cells = {{"condition", group.condition},
                       {"group", group.group},
-                      {"patients", group.by_tre.patients.size()},
-                      {"starts", group.by_tre.starts},
-                      {"median_tre_mm", group.median_tre_mm},
+                      {"patients", group.success.patients.size()},
+                      {"starts", group.success.starts},
+                      {"error", group.error},
+                      {"median_error_mm", group.median_error_mm},
+                      {"median_depth_mm", group.median_depth_mm},
+                      {"p95_depth_mm", group.p95_depth_mm},
                       {"median_seconds", group.median_seconds}};
-    append(success_of(group.by_tre, "tre_"), cells);
-    append(success_of(group.by_mrpd, "mrpd_"), cells);
+    append(success_of(group.success), cells);
     append({{"success_mm", success_mm}, {"commit", group.commits}}, cells);
     return cells;
   });
@@ -117,22 +122,17 @@ CsvTable patients_table(const std::vector<PopulationGroup>& groups) {
   std::vector<CsvCells> rows;
   for (const PopulationGroup& group : groups) {
     if (group.group != "all") continue;
-    for (std::size_t i = 0; i < group.by_tre.patients.size(); ++i) {
-      const PatientSuccess& tre = group.by_tre.patients[i];
-      const PatientSuccess& mrpd = group.by_mrpd.patients[i];
+    for (const PatientSuccess& patient : group.success.patients)
       rows.push_back({{"condition", group.condition},
-                      {"patient", tre.patient},
-                      {"starts", tre.starts},
-                      {"tre_successes", tre.successes},
-                      {"wilson_low", tre.wilson.low},
-                      {"wilson_high", tre.wilson.high},
-                      {"capture_mm", tre.capture.initial_tre_mm},
-                      {"capture_ended_by", to_string(tre.capture.end)},
-                      {"mrpd_successes", mrpd.successes},
-                      {"mrpd_capture_mm", mrpd.capture.initial_tre_mm},
-                      {"mrpd_capture_ended_by", to_string(mrpd.capture.end)},
+                      {"patient", patient.patient},
+                      {"starts", patient.starts},
+                      {"error", group.error},
+                      {"successes", patient.successes},
+                      {"wilson_low", patient.wilson.low},
+                      {"wilson_high", patient.wilson.high},
+                      {"capture_mm", patient.capture.initial_tre_mm},
+                      {"capture_ended_by", to_string(patient.capture.end)},
                       {"commit", group.commits}});
-    }
   }
   return csv_table(std::move(rows));
 }
@@ -141,18 +141,17 @@ CsvTable intervals_table(const std::vector<PopulationGroup>& groups) {
   std::vector<CsvCells> rows;
   for (const PopulationGroup& group : groups) {
     if (group.group != "all") continue;
-    for (const auto& [error, success] :
-         {std::pair("tre", &group.by_tre), std::pair("mrpd", &group.by_mrpd)})
-      for (std::size_t k = 0; k < success->intervals.size(); ++k)
-        rows.push_back({{"condition", group.condition},
-                        {"error", error},
-                        {"low_mm", success->intervals[k].low_mm},
-                        {"high_mm", success->intervals[k].high_mm},
-                        {"starts", success->intervals[k].trials},
-                        {"successes", success->intervals[k].successes},
-                        {"bootstrap_low", success->interval_bootstraps[k].low},
-                        {"bootstrap_high", success->interval_bootstraps[k].high},
-                        {"commit", group.commits}});
+    const std::vector<IntervalSuccess>& intervals = group.success.intervals;
+    for (std::size_t k = 0; k < intervals.size(); ++k)
+      rows.push_back({{"condition", group.condition},
+                      {"error", group.error},
+                      {"low_mm", intervals[k].low_mm},
+                      {"high_mm", intervals[k].high_mm},
+                      {"starts", intervals[k].trials},
+                      {"successes", intervals[k].successes},
+                      {"bootstrap_low", group.success.interval_bootstraps[k].low},
+                      {"bootstrap_high", group.success.interval_bootstraps[k].high},
+                      {"commit", group.commits}});
   }
   return csv_table(std::move(rows));
 }

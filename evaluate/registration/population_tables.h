@@ -11,14 +11,16 @@
 
 namespace af::evaluation {
 
-/// Some of a condition's patients, by both errors.
+/// Some of a condition's patients.
 struct PopulationGroup {
   std::string condition;
   std::string group;  ///< "all", "odd", "even", "real", or a kind of patient
-  PopulationSuccess by_tre;
-  PopulationSuccess by_mrpd;
-  std::string commits;          ///< of the programs that made the condition's runs
-  double median_tre_mm = kNan;  ///< of successes
+  std::string error;  ///< by which ends are counted: "TRE", "mRPD", or both
+  PopulationSuccess success;
+  std::string commits;            ///< of the programs that made the condition's runs
+  double median_error_mm = kNan;  ///< of successes
+  double median_depth_mm = kNan;  ///< of successes of one view
+  double p95_depth_mm = kNan;     ///< the same
   double median_seconds = kNan;
 };
 
@@ -30,7 +32,7 @@ std::vector<PopulationGroup> groups_of(const PopulationCondition& condition,
 CsvTable population_table(const std::vector<PopulationGroup>& groups, double success_mm);
 /// patients.csv: a row per condition and patient.
 CsvTable patients_table(const std::vector<PopulationGroup>& groups);
-/// intervals.csv: a row per condition, error and interval of initial TRE.
+/// intervals.csv: a row per condition and interval of initial TRE.
 CsvTable intervals_table(const std::vector<PopulationGroup>& groups);
 
 }  // namespace af::evaluation

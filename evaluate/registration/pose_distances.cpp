@@ -5,8 +5,10 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <utility>
 
+#include "base/error.h"
 #include "evaluate/registration/finished_rows.h"
 #include "evaluate/statistics/patient_names.h"
 #include "files/csv_cells.h"
@@ -26,23 +28,51 @@ struct EndPose {
 /// far below this; starts that were drawn apart are further from each other.
 constexpr double kSameStartMm = 1e-6;
 
+/// SHA-256 of a case's X-rays by camera; none where the run does not state them.
+using XrayHashes = std::map<std::string, nlohmann::json>;
+
 /// The registrations of one case by one renderer of a run.
 struct MethodEnds {
   std::string run, renderer, case_name;
+  XrayHashes xrays;
   std::vector<Eigen::Vector3d> points_ct_mm;
   std::map<std::int64_t, EndPose> ends;  ///< by start index; those with a pose
 };
 
+XrayHashes xrays_of(const EvaluationRun& run, const std::string& case_name) {
+  static const nlohmann::json::json_pointer inputs("/provenance/input_sha256");
+  XrayHashes hashes;
+  if (!run.summary.contains(inputs)) return hashes;
+  const std::string prefix = case_name + ": xray ";
+  for (const auto& [name, hash] : run.summary.at(inputs).items())
+    if (name.starts_with(prefix)) hashes[name.substr(prefix.size())] = hash;
+  return hashes;
+}
+
+/// InputError when ends would be compared that were found in different X-rays.
+void require_same_xrays(const MethodEnds& a, const MethodEnds& b) {
+  if (a.xrays.empty() || b.xrays.empty()) return;
+  for (const auto& [of, other] : {std::pair(&a, &b), std::pair(&b, &a)})
+    for (const auto& [camera, hash] : of->xrays)
+      if (const auto its = other->xrays.find(camera);
+          its == other->xrays.end() || its->second != hash)
+        throw InputError("--pose-distances",
+                         a.run + " and " + b.run,
+                         "must be of the same X-rays: those of case " + a.case_name + ", view " +
+                             camera + ", differ");
+}
+
 std::vector<MethodEnds> ends_of(const EvaluationRun& run) {
   const RunFacts facts = facts_of(run);
   std::map<std::pair<std::string, std::string>, MethodEnds> methods;
-  read_rows(run, [&](const RegistrationRow& row) {
+  read_rows(run, facts, [&](const RegistrationRow& row) {
     const FinishedCase& of_case = facts.case_of(row);
     MethodEnds& method = methods[{row.case_name, row.renderer}];
     if (method.run.empty())
       method = {run.folder.filename().string(),
                 row.renderer,
                 row.case_name,
+                xrays_of(run, row.case_name),
                 target_points(of_case.target_box_ct),
                 {}};
     const auto pose_of = [&](const std::array<double, 6>& deg_mm) {
@@ -95,14 +125,15 @@ std::vector<PoseDistanceRow> pose_distances(const std::vector<EvaluationRun>& ru
       const MethodEnds& b = methods[k];
       if (a.case_name != b.case_name) continue;
       const Distances distances = distances_of(a, b);
-      if (!distances.mm.empty())
-        rows.push_back({a.case_name,
-                        a.run,
-                        a.renderer,
-                        b.run,
-                        b.renderer,
-                        summarize(distances.mm),
-                        summarize(distances.deg)});
+      if (distances.mm.empty()) continue;
+      require_same_xrays(a, b);
+      rows.push_back({a.case_name,
+                      a.run,
+                      a.renderer,
+                      b.run,
+                      b.renderer,
+                      summarize(distances.mm),
+                      summarize(distances.deg)});
     }
   return rows;
 }
@@ -171,7 +202,10 @@ CsvTable patient_distances_table(const std::vector<PatientDistances>& methods) {
             {"student_low_mm", found.student.low},
             {"student_high_mm", found.student.high},
             {"margin_mm", found.margin},
-            {"p", found.p},
+            {"p",
+             found.has_enough_cases()
+                 ? number_text(found.p)
+                 : "fewer than " + std::to_string(kEnoughCasesForEquivalence) + " patients"},
             {"claim", claim_of(found)}};
   });
 }

@@ -24,7 +24,8 @@ struct PoseDistanceRow {
 };
 
 /// Every pair of methods of the runs that began at the same starts: rows of one case with equal
-/// start index and, up to rounding, equal start. FileError as facts_of() and read_rows().
+/// start index and, up to rounding, equal start. InputError when two such were found in different
+/// X-rays, as far as their runs state these; FileError as facts_of() and read_rows().
 std::vector<PoseDistanceRow> pose_distances(const std::vector<EvaluationRun>& runs);
 
 CsvTable pose_distances_table(const std::vector<PoseDistanceRow>& rows);

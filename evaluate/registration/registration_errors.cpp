@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluate/registration/registration_errors.h"
 
+#include <cmath>
+
 #include "base/error.h"
 #include "geometry/point_distances.h"
+#include "geometry/target_box.h"
 
 namespace af::evaluation {
 
@@ -35,6 +38,12 @@ RegistrationErrors registration_errors(const RigidTransform& room_from_ct,
   errors.mrpd_mm = reprojection_mm / count;
   errors.projection_detector_mm = detector_mm / count;
   errors.projection_isocenter_mm = isocenter_mm / count;
+  if (rig.cameras.size() == 1) {
+    const Vector3d target_ct_mm = mean_point(points_ct_mm);
+    const Vector3d gold_mm = gold_room_from_ct * target_ct_mm;
+    const Vector3d beam = (gold_mm - rig.cameras.front().source_point).normalized();
+    errors.depth_mm = std::abs((room_from_ct * target_ct_mm - gold_mm).dot(beam));
+  }
   return errors;
 }
 

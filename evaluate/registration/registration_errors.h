@@ -22,14 +22,21 @@ struct RegistrationErrors {
   double projection_isocenter_mm = kMissing;  ///< the same on the plane through the isocentre
   double rotation_deg = kMissing;             ///< angle of the rotation between the two poses
   double translation_mm = kMissing;           ///< distance of T c from G c, c the ROI centre
+  /// How far T moves the target's centre along the beam (source to centre by G), to either side:
+  /// what one view hardly shows. NaN with more views.
+  double depth_mm = kMissing;
 
-  /// In the order of columns.
+  /// Those that every number of views has, in the order of columns.
   [[nodiscard]] std::array<double, 5> values() const {
     return {mrpd_mm, projection_detector_mm, projection_isocenter_mm, rotation_deg, translation_mm};
   }
   auto members() {
-    return std::tie(
-        mrpd_mm, projection_detector_mm, projection_isocenter_mm, rotation_deg, translation_mm);
+    return std::tie(mrpd_mm,
+                    projection_detector_mm,
+                    projection_isocenter_mm,
+                    rotation_deg,
+                    translation_mm,
+                    depth_mm);
   }
 };
 

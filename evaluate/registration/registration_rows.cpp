@@ -56,6 +56,7 @@ CsvCells cells_of(const RegistrationRow& row, const RowParts& parts, double succ
                               {"projection_isocenter_mm", errors.projection_isocenter_mm},
                               {"rotation_error_deg", errors.rotation_deg},
                               {"translation_error_mm", errors.translation_mm},
+                              {"depth_mm", errors.depth_mm},
                               {"error", row.error}},
                              {{"squared_distance", row.squared_distance}}});
 }

@@ -40,15 +40,15 @@ struct RegistrationRow : registration::RegistrationRow {
   RegistrationErrors errors;
   double squared_distance = kMissing;  ///< Mahalanobis, of the error by the covariance
   std::string error;                   ///< message of a registration that threw
-  /// Of its case, and known where there is an end pose.
-  bool has_one_view = false;
+  bool has_one_view = false;           ///< of its case
 
+  /// The error by which every success, failure and capture range is counted: TRE, with one view,
+  /// which hardly shows depth, mRPD.
+  [[nodiscard]] double decisive_mm() const { return has_one_view ? errors.mrpd_mm : tre_mm; }
+  /// What tables call it.
+  [[nodiscard]] const char* decisive_name() const { return has_one_view ? "mRPD" : "TRE"; }
   /// As the column `success` has it.
-  [[nodiscard]] bool is_success(double success_tre_mm) const { return tre_mm < success_tre_mm; }
-  /// Whether the end is the right place: by TRE, with one view, which shows no depth, by mRPD.
-  [[nodiscard]] bool is_right(double success_mm) const {
-    return (has_one_view ? errors.mrpd_mm : tre_mm) < success_mm;
-  }
+  [[nodiscard]] bool is_success(double success_mm) const { return decisive_mm() < success_mm; }
   auto members() {
     return std::tuple_cat(registration::RegistrationRow::members(),
                           std::tie(draw_index,
@@ -76,7 +76,7 @@ struct TracedRow {
 };
 
 /// registrations.csv with the contract's columns, in the given order; timings last. Where a
-/// correction was wanted, every row has its columns. `success` is a TRE below `success_tre_mm`.
+/// correction was wanted, every row has its columns. `success` is is_success(success_tre_mm).
 CsvTable registrations_table(std::span<const RegistrationRow> rows,
                              double success_tre_mm = kSuccessTreMm);
 

@@ -12,6 +12,7 @@
 #include <tuple>
 #include <utility>
 
+#include "base/joined.h"
 #include "evaluate/registration/case_intervals.h"
 #include "evaluate/registration/success_statistics.h"
 #include "evaluate/registration/uncertainty_statistics.h"
@@ -46,13 +47,13 @@ std::vector<double> finite_values_of(const RowPointers& rows, const Value& value
   return values;
 }
 
-/// Mean, SD and standard error of the signed final error of each parameter: over right ends, how
+/// Mean, SD and standard error of the signed final error of each parameter: over successes, how
 /// far the optimum itself lies from the gold pose.
-json bias_json(const RowPointers& right) {
+json bias_json(const RowPointers& successful) {
   json result = json::object();
   for (std::size_t i = 0; i < kParameterNames.size(); ++i) {
-    const std::vector<double> values =
-        finite_values_of(right, [&](const RegistrationRow& row) { return row.final_deg_mm[i]; });
+    const std::vector<double> values = finite_values_of(
+        successful, [&](const RegistrationRow& row) { return row.final_deg_mm[i]; });
     const SampleSummary summary = summarize(values);
     result[kParameterNames[i]] = {
         {"mean", number_json(summary.mean)},
@@ -98,30 +99,43 @@ std::string failure_reason(const RegistrationRow& row) {
   return "other optimum";
 }
 
-/// Success, TRE, other errors, reasons and times of some rows.
+RowPointers of_one_view(RowPointers rows) {
+  std::erase_if(rows, [](const RegistrationRow* row) { return !row->has_one_view; });
+  return rows;
+}
+
+/// Success, errors, reasons and times of some rows.
 json statistics_of(const RowPointers& rows, const StatisticsOptions& options) {
   const auto tre_mm = [](const RegistrationRow& row) { return row.tre_mm; };
+  const auto error_mm = [](const RegistrationRow& row) { return row.decisive_mm(); };
+  const auto depth_mm = [](const RegistrationRow& row) { return row.errors.depth_mm; };
   RowPointers successful;
-  RowPointers right;
+  std::set<std::string> errors;
   std::map<std::string, int> stop_reasons;
   std::map<std::string, int> failures;
   for (const RegistrationRow* row : rows) {
-    if (row->is_success(options.success_tre_mm)) successful.push_back(row);
-    if (row->is_right(options.success_tre_mm))
-      right.push_back(row);
+    errors.insert(row->decisive_name());
+    if (row->is_success(options.success_tre_mm))
+      successful.push_back(row);
     else
       ++failures[failure_reason(*row)];
     ++stop_reasons[row->stop_reason];
   }
   const std::vector<double> with_pose_mm = finite_values_of(rows, tre_mm);
   json result = success_statistics(rows, options);
+  result["error"] = joined(errors, " or ");
   result["without_pose"] = rows.size() - with_pose_mm.size();
   result["tre_mm"] = to_json(summarize(with_pose_mm));
   result["tre_of_all_mm"] = summary_of_all(values_of(rows, tre_mm));
   result["tre_of_successes_mm"] = to_json(summarize(values_of(successful, tre_mm)));
-  result["bias"] = bias_json(right);
+  result["error_of_all_mm"] = summary_of_all(values_of(rows, error_mm));
+  result["error_of_successes_mm"] = to_json(summarize(values_of(successful, error_mm)));
+  result["depth_of_all_mm"] = summary_of_all(values_of(of_one_view(rows), depth_mm));
+  result["depth_of_successes_mm"] =
+      to_json(summarize(values_of(of_one_view(successful), depth_mm)));
+  result["bias"] = bias_json(successful);
   result["errors_of_successes"] = errors_json(
-      [&](const auto& error) { return to_json(summarize(finite_values_of(right, error))); });
+      [&](const auto& error) { return to_json(summarize(finite_values_of(successful, error))); });
   result["errors_of_all"] =
       errors_json([&](const auto& error) { return summary_of_all(values_of(rows, error)); });
   result["stop_reasons"] = stop_reasons;
@@ -136,24 +150,24 @@ json statistics_of(const RowPointers& rows, const StatisticsOptions& options) {
   return result;
 }
 
-/// Intervals over patients of the success rate, of the mean TRE of successes and of capture ranges.
+/// Intervals over patients of the success rate, of the mean error of successes and of capture
+/// ranges.
 json over_patients_json(const std::map<std::string, RowPointers>& by_patient,
                         const StatisticsOptions& options) {
   std::vector<CaseMean> rates;
-  std::vector<CaseMean> successful_tre_mm;
+  std::vector<CaseMean> successful_mm;
   for (const auto& [name, rows] : by_patient) {
-    CaseMean tre_mm;
+    CaseMean error_mm;
     for (const RegistrationRow* row : rows) {
       if (!row->is_success(options.success_tre_mm)) continue;
-      tre_mm.sum += row->tre_mm;
-      tre_mm.count += 1.0;
+      error_mm.sum += row->decisive_mm();
+      error_mm.count += 1.0;
     }
-    successful_tre_mm.push_back(tre_mm);
-    rates.push_back({tre_mm.count, static_cast<double>(rows.size())});
+    successful_mm.push_back(error_mm);
+    rates.push_back({error_mm.count, static_cast<double>(rows.size())});
   }
-  json result = {
-      {"rate", interval_over_cases(rates, options.seed)},
-      {"mean_tre_of_successes_mm", interval_over_cases(successful_tre_mm, options.seed)}};
+  json result = {{"rate", interval_over_cases(rates, options.seed)},
+                 {"mean_error_of_successes_mm", interval_over_cases(successful_mm, options.seed)}};
   add_capture_over_patients(by_patient, options, result);
   // Student's interval does not know that rates end at 0 and 1.
   for (const char* name : {"student_low", "student_high"})

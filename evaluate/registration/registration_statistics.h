@@ -12,7 +12,7 @@
 
 namespace af::evaluation {
 
-/// A TRE (or mRPD) at or above this, or no pose at all, is a gross failure.
+/// A RegistrationRow::decisive_mm() at or above this, or no pose at all, is a gross failure.
 inline constexpr double kGrossFailureMm = 10.0;
 
 /// How initial TRE is divided, the seed of the bootstrap, and what a success is.
@@ -23,10 +23,11 @@ struct StatisticsOptions {
   double success_tre_mm = kSuccessTreMm;
 };
 
-/// Counts, success (overall, per interval, per threshold; by TRE and by mRPD), gross failures,
-/// failures by reason, capture ranges, TRE over all runs (no pose counts as infinitely far) and
-/// over successes, bias, the other errors, stop reasons and times of one renderer; per case, too;
-/// intervals over patients (`over_cases`, whose cases are those of patient_of_case()).
+/// By which error ends are counted (`error`), counts, success (overall, per interval, per
+/// threshold), gross failures, failures by reason, capture ranges; that error, TRE and one view's
+/// depth over all runs (no pose counts as infinitely far) and over successes; bias, the other
+/// errors, stop reasons and times of one renderer; per case, too; intervals over patients
+/// (`over_cases`, whose cases are those of patient_of_case()).
 /// docs/errors.md defines each. \test RegistrationStatistics.CasesOfOnePatientAreOnePatient
 nlohmann::json renderer_statistics(std::span<const RegistrationRow> rows,
                                    const std::string& renderer,

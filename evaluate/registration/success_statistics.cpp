@@ -20,32 +20,21 @@ using nlohmann::json;
 
 namespace {
 
-/// The ends are TREs, or mRPDs: with one view the depth along its rays stays unknown, so that a TRE
-/// says little, while a distance from the rays can be small; or the one of these that
-/// RegistrationRow::is_right() looks at.
-enum class EndError { Tre, Mrpd, Decisive };
-
-std::vector<TreOutcome> outcomes_by(EndError error, const RowPointers& rows) {
+std::vector<TreOutcome> outcomes_of(const RowPointers& rows) {
   std::vector<TreOutcome> outcomes;
   outcomes.reserve(rows.size());
-  for (const RegistrationRow* row : rows) {
-    const bool by_mrpd =
-        error == EndError::Mrpd || (error == EndError::Decisive && row->has_one_view);
-    outcomes.push_back({row->initial_tre_mm, by_mrpd ? row->errors.mrpd_mm : row->tre_mm});
-  }
+  for (const RegistrationRow* row : rows)
+    outcomes.push_back({row->initial_tre_mm, row->decisive_mm()});
   return outcomes;
-}
-
-json share_below(double threshold_mm, const std::vector<TreOutcome>& outcomes) {
-  json share = proportion_json(count_successes(outcomes, threshold_mm),
-                               static_cast<std::int64_t>(outcomes.size()));
-  share["threshold_mm"] = threshold_mm;
-  return share;
 }
 
 json ladder_json(const std::vector<TreOutcome>& outcomes) {
   json ladder = json::array();
-  for (const double threshold : kLadderMm) ladder.push_back(share_below(threshold, outcomes));
+  for (const double threshold_mm : kLadderMm) {
+    ladder.push_back(proportion_json(count_successes(outcomes, threshold_mm),
+                                     static_cast<std::int64_t>(outcomes.size())));
+    ladder.back()["threshold_mm"] = threshold_mm;
+  }
   return ladder;
 }
 
@@ -86,24 +75,18 @@ json cumulative_capture_json(const std::vector<TreOutcome>& outcomes, double suc
 }  // namespace
 
 json success_statistics(const RowPointers& rows, const StatisticsOptions& options) {
-  const std::vector<TreOutcome> by_tre = outcomes_by(EndError::Tre, rows);
-  const std::vector<TreOutcome> by_mrpd = outcomes_by(EndError::Mrpd, rows);
-  const std::vector<IntervalSuccess> intervals = intervals_of(by_tre, options);
+  const std::vector<TreOutcome> outcomes = outcomes_of(rows);
+  const std::vector<IntervalSuccess> intervals = intervals_of(outcomes, options);
   const auto trials = static_cast<std::int64_t>(rows.size());
-  json result = proportion_json(count_successes(by_tre, options.success_tre_mm), trials);
+  json result = proportion_json(count_successes(outcomes, options.success_tre_mm), trials);
   result["intervals"] = json::array();
   for (const IntervalSuccess& interval : intervals)
     result["intervals"].push_back(interval_json(interval));
-  result["thresholds"] = ladder_json(by_tre);
+  result["thresholds"] = ladder_json(outcomes);
   result["gross_failures"] =
-      proportion_json(trials - count_successes(by_tre, kGrossFailureMm), trials);
-  result["mrpd_gross_failures"] =
-      proportion_json(trials - count_successes(by_mrpd, kGrossFailureMm), trials);
+      proportion_json(trials - count_successes(outcomes, kGrossFailureMm), trials);
   result["capture_range"] = capture_json(intervals);
-  result["cumulative_capture_range"] = cumulative_capture_json(by_tre, options.success_tre_mm);
-  result["mrpd_success"] = share_below(options.success_tre_mm, by_mrpd);
-  result["mrpd_thresholds"] = ladder_json(by_mrpd);
-  result["mrpd_capture_range"] = capture_json(intervals_of(by_mrpd, options));
+  result["cumulative_capture_range"] = cumulative_capture_json(outcomes, options.success_tre_mm);
   return result;
 }
 
@@ -115,7 +98,7 @@ void add_capture_over_patients(const std::map<std::string, RowPointers>& by_pati
   std::vector<double> ranges_mm;
   std::int64_t at_least = 0;
   for (const auto& [name, rows] : by_patient) {
-    patients.push_back(intervals_of(outcomes_by(EndError::Decisive, rows), options));
+    patients.push_back(intervals_of(outcomes_of(rows), options));
     const CaptureRange range = capture_range(patients.back());
     own_ranges.push_back({range.initial_tre_mm, 1.0});
     ranges_mm.push_back(range.initial_tre_mm);

@@ -11,14 +11,13 @@
 
 namespace af::evaluation {
 
-/// Of some rows: counts and rate; per interval of initial TRE (`intervals`); below each threshold
-/// of a ladder, by TRE (`thresholds`) and by mRPD (`mrpd_thresholds`); gross failures and the
-/// capture range of van de Kraats, by TRE and by mRPD, and the cumulative range. docs/errors.md
-/// defines each.
+/// Of some rows, by RegistrationRow::decisive_mm(): counts and rate; per interval of initial TRE
+/// (`intervals`); below each threshold of a ladder (`thresholds`); gross failures, the capture
+/// range of van de Kraats and the cumulative range. docs/errors.md defines each.
 nlohmann::json success_statistics(const RowPointers& rows, const StatisticsOptions& options);
 
 /// Adds to `over_patients`: `capture_range_mm`, the mean, smallest and largest of the patients' own
-/// capture ranges (of one view by mRPD), how many are lower bounds, and intervals over patients;
+/// capture ranges, how many are lower bounds, and intervals over patients;
 /// `pooled_capture_range_mm`, the bootstrap interval over patients of the range of all starts
 /// together.
 void add_capture_over_patients(const std::map<std::string, RowPointers>& by_patient,

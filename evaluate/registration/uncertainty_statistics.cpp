@@ -38,7 +38,7 @@ json coverage_json(const std::map<std::string, RowPointers>& by_patient,
   for (const auto& [name, rows] : by_patient) {
     CaseMean mean;
     for (const RegistrationRow* row : rows) {
-      if (!row->is_right(options.success_tre_mm) || !region.is_known(*row)) continue;
+      if (!row->is_success(options.success_tre_mm) || !region.is_known(*row)) continue;
       mean.count += 1.0;
       mean.sum += region.holds(*row) ? 1.0 : 0.0;
     }
@@ -93,10 +93,10 @@ json uncertainty_statistics(const std::map<std::string, RowPointers>& by_patient
   for (const auto& [name, rows] : by_patient)
     for (const RegistrationRow* row : rows) {
       all.push_back(row);
-      const bool is_right = row->is_right(options.success_tre_mm);
+      const bool is_success = row->is_success(options.success_tre_mm);
       if (std::isfinite(row->uncertainty.confidence))
-        (is_right ? successes : failures).push_back(row->uncertainty.confidence);
-      if (is_right && std::isfinite(row->squared_distance))
+        (is_success ? successes : failures).push_back(row->uncertainty.confidence);
+      if (is_success && std::isfinite(row->squared_distance))
         squared_distances.push_back(row->squared_distance);
     }
   if (successes.empty() && failures.empty() && squared_distances.empty()) return nullptr;

@@ -11,7 +11,7 @@
 
 namespace af::evaluation {
 
-/// Of some rows, by patient: how many right ends (RegistrationRow::is_right()) lie inside their
+/// Of some rows, by patient: how many right ends (RegistrationRow::is_success()) lie inside their
 /// 95 % regions, by pose (Mahalanobis) and by TRE (`predicted_tre_95_mm`), with intervals over
 /// patients; the area under the ROC curve of confidence, right ends against others; and for some
 /// confidences the shares of both that have at least so much; how many of both have each verdict.

@@ -29,7 +29,6 @@ void measure_pose(const RigidTransform& room_from_ct,
                                    yardstick.points_ct_mm,
                                    yardstick.center_ct_mm,
                                    yardstick.rig);
-  row.has_one_view = yardstick.rig.cameras.size() == 1;
   if (yardstick.stated_pose.has_value())
     row.stated_pose_tre_mm =
         mean_tre_mm(room_from_ct, *yardstick.stated_pose, yardstick.points_ct_mm);

@@ -23,6 +23,8 @@ struct Yardstick {
   Eigen::Vector3d center_ct_mm = Eigen::Vector3d::Zero();  ///< c_roi
   CameraRig rig;                                           ///< the cameras of the case's views
 
+  [[nodiscard]] bool has_one_view() const { return rig.cameras.size() == 1; }
+
   /// Of parameters as rows have them.
   [[nodiscard]] RigidTransform pose_of(const std::array<double, 6>& deg_mm) const {
     return pose_from_parameters(gold_frame, PoseParameters::from_deg_and_mm(deg_mm));

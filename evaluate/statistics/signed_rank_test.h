@@ -7,6 +7,9 @@
 
 namespace af::evaluation {
 
+/// Fewer pairs say nothing by a test of a hypothesis.
+inline constexpr std::size_t kLeastPairsOfATest = 10;
+
 /// Result of Wilcoxon's signed-rank test.
 struct SignedRankTest {
   std::size_t pairs_used = 0;   ///< differences other than zero

@@ -26,7 +26,7 @@ ProportionInterval wilson_interval(std::int64_t successes, std::int64_t trials, 
 
 std::int64_t count_successes(std::span<const TreOutcome> outcomes, double threshold_mm) {
   return std::count_if(outcomes.begin(), outcomes.end(), [&](const TreOutcome& outcome) {
-    return outcome.tre_mm < threshold_mm;
+    return outcome.error_mm < threshold_mm;
   });
 }
 
@@ -43,7 +43,7 @@ std::optional<CumulativeCaptureRange> cumulative_capture_range(std::span<const T
   std::optional<CumulativeCaptureRange> range;
   std::int64_t successes = 0;
   for (std::size_t i = 0; i < sorted.size(); ++i) {
-    successes += sorted[i].tre_mm < threshold_mm ? 1 : 0;
+    successes += sorted[i].error_mm < threshold_mm ? 1 : 0;
     // Starts of equal error are taken together.
     if (i + 1 < sorted.size() && sorted[i + 1].initial_tre_mm == sorted[i].initial_tre_mm) continue;
     const auto starts = static_cast<std::int64_t>(i + 1);
@@ -68,7 +68,7 @@ std::vector<IntervalSuccess> success_per_interval(std::span<const TreOutcome> ou
     if (!(position >= 0.0 && position < intervals)) continue;
     IntervalSuccess& interval = result[static_cast<std::size_t>(position)];
     ++interval.trials;
-    if (outcome.tre_mm < threshold_mm) ++interval.successes;
+    if (outcome.error_mm < threshold_mm) ++interval.successes;
   }
   for (IntervalSuccess& interval : result)
     interval.wilson = wilson_interval(interval.successes, interval.trials);

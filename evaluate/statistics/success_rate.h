@@ -10,10 +10,10 @@
 
 namespace af::evaluation {
 
-/// The paper's: TRE below this is a success (Sec. IV-B).
+/// The paper's: an end with an error below this is a success (Sec. IV-B).
 inline constexpr double kSuccessTreMm = 2.5;
 
-/// Below which ends are counted, mm: of TRE and of mRPD alike.
+/// Below which ends are counted, mm.
 inline constexpr std::array<double, 5> kLadderMm = {1.0, 2.0, 2.5, 5.0, 10.0};
 
 /// The share of starts that must succeed inside a capture range.
@@ -47,10 +47,10 @@ struct IntervalSuccess {
 /// One registration for the success statistics.
 struct TreOutcome {
   double initial_tre_mm = 0.0;
-  double tre_mm = 0.0;  ///< NaN: failed
+  double error_mm = 0.0;  ///< of the end; NaN: failed
 };
 
-/// Number of outcomes with TRE below `threshold_mm`; NaN never is.
+/// Number of outcomes with an error below `threshold_mm`; NaN never is.
 std::int64_t count_successes(std::span<const TreOutcome> outcomes, double threshold_mm);
 
 /// The initial TRE up to which enough of all starts together succeed.

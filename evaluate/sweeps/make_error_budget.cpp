@@ -42,10 +42,10 @@ ChainRun read_run(const std::string& step) {
   const EvaluationRun& files = found.front();
   if (files.summary.at("cases").size() != 1 || files.summary.at("renderers").size() != 1)
     throw InputError("--step", step, "must be of one case and one renderer");
-  const double success_tre_mm = facts_of(files).success_tre_mm;
+  const RunFacts facts = facts_of(files);
   BudgetRun budget = {step.substr(0, equals), {}};
-  read_rows(files, [&](const RegistrationRow& row) {
-    budget.ends.push_back(row.is_success(success_tre_mm)
+  read_rows(files, facts, [&](const RegistrationRow& row) {
+    budget.ends.push_back(row.is_success(facts.success_tre_mm)
                               ? std::optional(PoseParameters::from_deg_and_mm(row.final_deg_mm))
                               : std::nullopt);
   });

@@ -14,14 +14,15 @@ MOST_FAILURES = 60
 
 
 def spark(points, success_mm):
-    """TRE along a search as a small line; dashed: below which a start succeeds."""
+    """TRE along a search as a small line; dashed: below which a start succeeds, unless one view hides that."""
     width, height = 150, 40
-    top, poses = max([2 * success_mm, *(tre for _, tre in points)]), max(1, points[-1][0])
+    top, poses = max([2 * (success_mm or 0), *(tre for _, tre in points)]), max(1, points[-1][0])
     y = lambda tre: f"{height - 2 - (height - 4) * tre / top:.1f}"  # noqa: E731
     line = " ".join(f"{width * tried / poses:.1f},{y(tre)}" for tried, tre in points)
     text = f"TRE from {three(points[0][1])} to {three(points[-1][1])} mm over {whole(poses)} poses"
-    return Markup('<svg class="spark" viewBox="0 0 %d %d" role="img" aria-label="%s"><title>%s</title><line x1="0" x2="%d" y1="%s" y2="%s"/>'
-                  '<polyline points="%s"/></svg>') % (width, height, text, text, width, y(success_mm), y(success_mm), line)
+    limit = Markup('<line x1="0" x2="%d" y1="%s" y2="%s"/>') % (width, y(success_mm), y(success_mm)) if success_mm else ""
+    return Markup('<svg class="spark" viewBox="0 0 %d %d" role="img" aria-label="%s"><title>%s</title>%s<polyline points="%s"/></svg>') % (
+        width, height, text, text, limit, line)
 
 
 def start_name(start):
@@ -50,7 +51,8 @@ def repeat_command(summary, start):
 
 
 def failures(run):
-    success_mm, rows, count = float(run.summary["success_tre_mm"]), [], 0
+    # The searches' TREs are no measure of success with one view.
+    success_mm, rows, count = None if run.has_one_view else float(run.summary["success_tre_mm"]), [], 0
     for start in run.starts:
         if start["success"] == "1":
             continue
@@ -60,12 +62,12 @@ def failures(run):
         command = repeat_command(run.summary, start)
         again = Markup('<details><summary>command</summary><pre class="command">%s</pre></details>') % command if command else "–"
         rows.append([start["case"], method_name(start["renderer"]), start["start_index"], three(start["initial_tre_mm"]),
-                     three(start["tre_mm"]), start["error"] or start["stop_reason"], trace_cell(run, start, success_mm), again])
+                     three(start["error_mm"]), start["error"] or start["stop_reason"], trace_cell(run, start, success_mm), again])
     if not count:
         return [Text("No registration failed.")]
     text = Markup("All %s in every rate above.") % counted(count, "failure counts", "failures count")
     if count > MOST_FAILURES:
         text += Markup(' The first %s are listed; <a href="%s">registrations.csv</a> has all.') % (MOST_FAILURES, run.link("registrations.csv"))
-    return [Text(text), Table(["Case", "Method", "#Start", "#Initial TRE (mm)", "#Final TRE (mm)", "Stopped because",
+    return [Text(text), Table(["Case", "Method", "#Start", "#Initial TRE (mm)", f"#Final {run.error} (mm)", "Stopped because",
                                "TRE along the search", "Repeat it alone"], rows,
-                              f"Failed starts: TRE against the poses tried, the dashed line at {three(success_mm)} mm")]
+                              "Failed starts: TRE against the poses tried" + (f", the dashed line at {three(success_mm)} mm" if success_mm else ""))]

@@ -88,8 +88,8 @@ def line_at(axes, value, text, horizontal=True):
                       color=QUIET, fontsize=9)
 
 
-def success_rates(groups):
-    """Of (label, intervals of a summary): success per interval of initial TRE with Wilson intervals (Fig. 16)."""
+def success_rates(groups, error="TRE"):
+    """Of (label, intervals of a summary): success by an error per interval of initial TRE with Wilson intervals (Fig. 16)."""
     figure, (axes,) = new_figure("Success against initial error")
     rows = []
     for place, (label, intervals) in enumerate(groups):
@@ -104,12 +104,12 @@ def success_rates(groups):
         axes.errorbar(x, y, yerr=spread, fmt="o:", markersize=5, capsize=3, color=COLORS[place % 6], label=label)
         axes.set_xlim(0, max(axes.get_xlim()[1] if place else 0, intervals[-1]["high_mm"] if intervals else 1))
     line_at(axes, 95, "95")
-    axes.set(xlabel="initial TRE (mm)", ylabel="success (% of starts)", ylim=(0, 103))
+    axes.set(xlabel="initial TRE (mm)", ylabel=f"success by {error} (% of starts)", ylim=(0, 103))
     axes.legend(loc="lower left")
     return figure, ["group", "low_mm", "high_mm", "starts", "successes", "rate", "wilson_low", "wilson_high"], rows
 
 
-def tre_histogram(groups, success_mm):
+def tre_histogram(groups, success_mm, error="TRE"):
     """Shares of each group's starts per error, eight bars per tenfold; the last holds all beyond, and ends without a
     pose (Fig. 15)."""
     figure, (axes,) = new_figure("Error after registration")
@@ -118,8 +118,8 @@ def tre_histogram(groups, success_mm):
     for place, (label, starts) in enumerate(groups):
         counts = [0] * len(edges)
         for start in starts:
-            tre = start["tre_mm"]
-            step = 8 * math.log10(max(tre, LOWEST_MM) / LOWEST_MM) if tre < HIGHEST_MM else 32
+            end = start["error_mm"]
+            step = 8 * math.log10(max(end, LOWEST_MM) / LOWEST_MM) if end < HIGHEST_MM else 32
             counts[min(32, int(step + 1e-9))] += 1
         ends = [*edges, 10 * HIGHEST_MM]
         for count, low, high in zip(counts, ends, ends[1:]):
@@ -136,7 +136,7 @@ def tre_histogram(groups, success_mm):
     millimetres(axes.xaxis, HIGHEST_MM / 2)
     axes.grid(axis="x", visible=False)
     line_at(axes, success_mm, f"success: below {success_mm:g} mm", horizontal=False)
-    axes.set(xlabel="TRE (mm); at the right edge: 100 mm and more, no pose", ylabel="share of starts (%)")
+    axes.set(xlabel=f"{error} (mm); at the right edge: 100 mm and more, no pose", ylabel="share of starts (%)")
     axes.set_ylim(0)
     axes.legend(loc="upper left")
     return figure, ["group", "low_mm", "high_mm", "starts", "share"], rows
@@ -148,18 +148,18 @@ def in_part(groups):
     return [(label, starts[::stride]) for label, starts in groups], "" if stride == 1 else f", one start in {stride}"
 
 
-def tre_scatter(groups, largest_mm, success_mm):
-    """Initial against final TRE, one dot per start."""
+def tre_scatter(groups, largest_mm, success_mm, error="TRE"):
+    """Initial TRE against the final error, one dot per start."""
     groups, part = in_part(groups)
     figure, (axes,) = new_figure("Error before and after registration" + part)
     rows = []
     for place, (label, starts) in enumerate(groups):
-        rows += [[label, start["initial_tre_mm"], start["tre_mm"]] for start in starts]
-        ended = [start for start in starts if math.isfinite(start["tre_mm"])]
-        axes.scatter([start["initial_tre_mm"] for start in ended], [max(LOWEST_MM, start["tre_mm"]) for start in ended], s=14,
+        rows += [[label, start["initial_tre_mm"], start["error_mm"]] for start in starts]
+        ended = [start for start in starts if math.isfinite(start["error_mm"])]
+        axes.scatter([start["initial_tre_mm"] for start in ended], [max(LOWEST_MM, start["error_mm"]) for start in ended], s=14,
                      marker="o^sDv<"[place % 6], color=COLORS[place % 6], label=label)
     axes.set_yscale("log")
-    axes.set(xlabel="initial TRE (mm)", ylabel="final TRE (mm)", xlim=(0, largest_mm))
+    axes.set(xlabel="initial TRE (mm)", ylabel=f"final {error} (mm)", xlim=(0, largest_mm))
     axes.set_ylim(LOWEST_MM, max(HIGHEST_MM, axes.get_ylim()[1]))
     millimetres(axes.yaxis, axes.get_ylim()[1])
     steps = [largest_mm * step / 200 for step in range(1, 201)]
@@ -167,22 +167,22 @@ def tre_scatter(groups, largest_mm, success_mm):
     axes.annotate("no change", (steps[-1], steps[-1]), ha="right", va="bottom", color=QUIET, fontsize=9)
     line_at(axes, success_mm, "success below")
     axes.legend(loc="upper left")
-    return figure, ["group", "initial_tre_mm", "tre_mm"], rows
+    return figure, ["group", "initial_tre_mm", "error_mm"], rows
 
 
-def confidence(groups, success_mm):
+def confidence(groups, success_mm, error="TRE"):
     """Stated confidence against the error, 0 where there is no end."""
     groups, part = in_part(groups)
     figure, (axes,) = new_figure("Stated confidence against the error" + part)
     rows, lowest = [], 1e-3
     for place, (label, starts) in enumerate(groups):
-        judged = [start for start in starts if math.isfinite(start.get("confidence", math.nan)) and math.isfinite(start["tre_mm"])]
-        rows += [[label, start["confidence"], start["tre_mm"]] for start in judged]
+        judged = [start for start in starts if math.isfinite(start.get("confidence", math.nan)) and math.isfinite(start["error_mm"])]
+        rows += [[label, start["confidence"], start["error_mm"]] for start in judged]
         for found, name in ((True, label), (False, f"{label}: not found")):
             shown = [start for start in judged if (start.get("verdict") != "not found" and start["confidence"] > 0) == found]
             if shown or found:
                 axes.scatter([min(1 - lowest, max(lowest, start["confidence"])) if start["confidence"] > 0 else lowest / 3 for start in shown],
-                             [max(LOWEST_MM, start["tre_mm"]) for start in shown], s=18, label=name,
+                             [max(LOWEST_MM, start["error_mm"]) for start in shown], s=18, label=name,
                              marker="o^sDv<"[place % 6] if found else "x", color=COLORS[place % 6])
     axes.set_xscale("logit")
     axes.set_yscale("log")
@@ -192,10 +192,10 @@ def confidence(groups, success_mm):
     axes.set_xticks([], minor=True)
     axes.set_ylim(LOWEST_MM, max(HIGHEST_MM, axes.get_ylim()[1]))
     millimetres(axes.yaxis, axes.get_ylim()[1])
-    axes.set(xlabel="confidence that the end is right", ylabel="final TRE (mm)")
+    axes.set(xlabel="confidence that the end is right", ylabel=f"final {error} (mm)")
     line_at(axes, success_mm, f"right: below {success_mm:g} mm")
     axes.legend(loc="upper left")
-    return figure, ["group", "confidence", "tre_mm"], rows
+    return figure, ["group", "confidence", "error_mm"], rows
 
 
 def quantile(values, share):
@@ -306,11 +306,11 @@ def figures_of(run):
     if run.kind == "registration":
         success_mm = float(summary["success_tre_mm"])
         intervals = [(method_name(entry["renderer"]), entry["intervals"]) for entry in summary["renderers"]]
-        figures = {"success-rate": lambda: success_rates(intervals),
-                   "tre-histogram": lambda: tre_histogram(groups_of(run), success_mm),
-                   "tre-scatter": lambda: tre_scatter(groups_of(run), intervals[0][1][-1]["high_mm"], success_mm)}
+        figures = {"success-rate": lambda: success_rates(intervals, run.error),
+                   "tre-histogram": lambda: tre_histogram(groups_of(run), success_mm, run.error),
+                   "tre-scatter": lambda: tre_scatter(groups_of(run), intervals[0][1][-1]["high_mm"], success_mm, run.error)}
         if any(math.isfinite(start.get("confidence", math.nan)) for start in run.starts):
-            figures["confidence"] = lambda: confidence(groups_of(run), success_mm)
+            figures["confidence"] = lambda: confidence(groups_of(run), success_mm, run.error)
         return figures
     if run.kind == "image-quality":
         figures = {"psnr": lambda: psnr_boxes(psnr_of_rows(run.rows("image-quality.csv"), field_name(run)), is_papers_setting(run))}

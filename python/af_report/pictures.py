@@ -7,7 +7,7 @@ from .figures import figures_of, svg_of
 from .numbers import three, whole
 from .runs import method_name
 
-PICTURE_CAPTION = Markup("<b>Case %s, the %s result, view %s%s.</b> By %s, start %s, from %s mm to %s mm TRE.")
+PICTURE_CAPTION = Markup("<b>Case %s, the %s result, view %s%s.</b> By %s, start %s, from %s mm TRE to %s mm %s.")
 
 
 def run_figure(run, name, alternative, caption, is_wide=False):
@@ -40,7 +40,7 @@ def pictures(run):
             links = [("for Slicer", run.link(entry["slicer"]))] if entry.get("slicer") else []
             caption = PICTURE_CAPTION % (case, which, entry["camera"], ", before and after" if has_outlines else "",
                                          method_name(entry["renderer"]), whole(entry["start_index"]), three(entry["initial_tre_mm"]),
-                                         three(entry["tre_mm"]))
+                                         three(entry["error_mm"]), entry["error"])
             shown.append((case, which, not has_outlines, picture(run, entry["file"], f"{which} registration", caption, links)))
     blocks = []
     if shown:

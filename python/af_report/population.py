@@ -6,11 +6,6 @@ from .figures import BLUE, COLORS, SKY, VERMILION, new_figure
 from .files import rows_of
 
 
-def error_of(condition):
-    """With one view depth is free, so that only mRPD says something: VARIANT-1 of VARIANT-1-PRESET."""
-    return "mrpd" if condition.rpartition("-")[0].endswith("-1") else "tre"
-
-
 def is_drawn(condition):
     """By the first renderer."""
     return ", " not in condition
@@ -21,7 +16,7 @@ def success(folder):
     panels = {}
     for row in rows_of(folder / "intervals.csv"):
         condition = row.text("condition")
-        if is_drawn(condition) and row.text("error") == error_of(condition):
+        if is_drawn(condition):
             name, _, preset = condition.rpartition("-")
             panels.setdefault(name or condition, {}).setdefault(preset, []).append(row)
     if not panels:
@@ -38,8 +33,9 @@ def success(folder):
             spread = [[max(0, value - 100 * row.number("bootstrap_low")) for value, row in zip(y, shown)],
                       [max(0, 100 * row.number("bootstrap_high") - value) for value, row in zip(y, shown)]]
             axes.errorbar(x, y, yerr=spread, fmt="o-", markersize=4, capsize=2, color=COLORS[place % 6], label=preset)
-        views = " view, by mRPD" if panel.endswith("-1") else " views" if panel.endswith("-2") else ""
-        axes.set(title=panel + views, xlabel="initial TRE (mm)", ylabel="success (%)", ylim=(0, 103),
+        views = " view" if panel.endswith("-1") else " views" if panel.endswith("-2") else ""
+        error = " or ".join(sorted({row.text("error") for entries in presets.values() for row in entries}))
+        axes.set(title=f"{panel}{views}, by {error}", xlabel="initial TRE (mm)", ylabel="success (%)", ylim=(0, 103),
                  xlim=(0, max(row.number("high_mm") for entries in presets.values() for row in entries)))
         axes.legend(loc="lower left", fontsize=9)
     return figure, None, None
@@ -57,7 +53,7 @@ def capture_ranges(folder):
         condition = row.text("condition")
         if condition not in names:
             continue
-        range_mm = row.number("mrpd_capture_mm" if error_of(condition) == "mrpd" else "capture_mm")
+        range_mm = row.number("capture_mm")
         before = equals[condition, range_mm] = equals.get((condition, range_mm), -1) + 1
         number = re.search(r"(\d+)$", row.text("patient"))
         x, y = marks["odd" if number and int(number[1]) % 2 else "even"]
@@ -68,8 +64,7 @@ def capture_ranges(folder):
         if marks[half][0]:
             axes.scatter(*marks[half], s=16, color=color, label=label)
     for place, row in enumerate(means):
-        error = error_of(row.text("condition"))
-        middle, low, high = (row.number(f"{error}_patients_capture_{part}_mm") for part in ("mean", "bootstrap_low", "bootstrap_high"))
+        middle, low, high = (row.number(f"patients_capture_{part}_mm") for part in ("mean", "bootstrap_low", "bootstrap_high"))
         spread = [[max(0, middle - low)], [max(0, high - middle)]] if low == low and high == high else None
         axes.errorbar([middle], [-place - 0.2], xerr=spread, fmt="s", capsize=3, color=VERMILION,
                       label=None if place else "mean, 95 % over patients")

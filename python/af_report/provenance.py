@@ -28,6 +28,8 @@ WORDS = [
                     "detection noise."),
     ("Success", "TRE below the run's threshold, 2.5 mm unless it states another; with one view, mRPD. Failures of every kind stay in the "
                 "denominator."),
+    ("Depth off", "With one view: how far the found pose moves the target's centre along the beam, to either side, from where the gold pose "
+                  "puts it; mm. It hardly shows, so that success does not count it."),
     ("mRPD", "Mean reprojection distance: of a target point at the gold pose from the line through the source and the same point at the "
              "found pose; mm (van de Kraats et al., IEEE TMI 24(9), 2005)."),
     ("Confidence", "What a registration states of its own end, without the truth: that it is right, from 0 to 1. From 0.99 on the "

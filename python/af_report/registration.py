@@ -11,8 +11,6 @@ from .numbers import as_number, capture, counted, milliseconds, percent, rate, t
 from .pictures import pictures, run_figure
 from .runs import method_name
 
-# Fewer starts tell nothing by a test of a hypothesis.
-LEAST_STARTS_OF_A_TEST = 20
 MOST_CURVES = 6
 
 
@@ -25,12 +23,9 @@ def method_text(run, renderer):
     return f"{method_name(name)}: {'; '.join(part for part in parts if part)}"
 
 
-def success_of(run, renderer):
-    return renderer["mrpd_success"] if run.has_one_view else renderer
-
-
-def errors_of(run, renderer):
-    return renderer["errors_of_successes"]["mrpd_mm"] if run.has_one_view else renderer["tre_of_successes_mm"]
+def depth_text(depth):
+    """Median and 95th percentile of how far one view's depth is off; a dash where there is none."""
+    return f"{three(depth['median'])}, {three(depth['p95'])}" if depth["count"] else "–"
 
 
 def confidence_text(renderer):
@@ -64,24 +59,28 @@ def overview(runs):
             link = Markup('<a href="#%s">%s</a>') % (run.anchor, run.name)
             name = method_text(run, renderer)
             rows.append([link, Markup("%s <b>(default)</b>") % name if run.is_default(renderer) else name, whole(renderer["starts"]),
-                         rate(success_of(run, renderer)) + (" by mRPD" if run.has_one_view else ""),
-                         three(errors_of(run, renderer)["mean"]), three(renderer["tre_of_all_mm"]["median"]),
-                         three(renderer["tre_of_all_mm"]["p95"]), milliseconds(renderer["seconds"]["median"]),
+                         rate(renderer), renderer["error"], three(renderer["error_of_successes_mm"]["mean"]),
+                         three(renderer["error_of_all_mm"]["median"]), three(renderer["error_of_all_mm"]["p95"]),
+                         depth_text(renderer["depth_of_all_mm"]), milliseconds(renderer["seconds"]["median"]),
                          confidence_text(renderer), whole(renderer["gross_failures"]["successes"]), own_captures(renderer)])
-    return Table(["Run", "Method", "#Starts", "#Success (95 % interval)", "#Mean TRE of successes (mm)", "#Median TRE of all (mm)",
-                  "#95th percentile (mm)", "#Median ms", "Confidence ≥ 0.9", "#Gross failures", "Capture range"], rows,
-                 "Every run and method; a click on a title sorts. With one view, successes and their mean are by mRPD")
+    return Table(["Run", "Method", "#Starts", "#Success (95 % interval)", "by", "#Mean error of successes (mm)", "#Median of all (mm)",
+                  "#95th percentile (mm)", "#Depth off: median, 95th percentile (mm)", "#Median ms", "Confidence ≥ 0.9", "#Gross failures",
+                  "Capture range"], rows,
+                 "Every run and method; a click on a title sorts. Errors are TREs, with one view mRPDs, whose depth is a column of its own")
 
 
 def tiles(run):
     """Success, error, time and confidence of the first method."""
-    first, of_view = run.summary["renderers"][0], " by mRPD" if run.has_one_view else ""
+    first = run.summary["renderers"][0]
+    error, depth = first["error"], first["depth_of_successes_mm"]
     who = method_name(first["renderer"])
     gold = first["gold_uncertainty_mm"]
     confident, _, wrong = confidence_text(first).removeprefix("right ").partition(", ")
-    return [(percent(success_of(run, first)["rate"]), f"of {whole(success_of(run, first)['starts'])} starts succeed{of_view}", f"{run.name}: {who}"),
-            (f"{three(errors_of(run, first)['mean'])} mm", f"mean {'mRPD' if of_view else 'TRE'} of successes",
-             "" if gold is None else f"the gold standard by itself: {three(gold)} mm"),
+    own = "" if gold is None else f"the gold standard by itself: {three(gold)} mm"
+    return [(percent(first["rate"]), f"of {whole(first['starts'])} starts succeed" + (f" by {error}" if run.has_one_view else ""),
+             f"{run.name}: {who}"),
+            (f"{three(first['error_of_successes_mm']['mean'])} mm", f"mean {error} of successes",
+             f"depth off by {three(depth['median'])} mm (median), {three(depth['p95'])} mm (95th percentile)" if depth["count"] else own),
             (f"{milliseconds(first['seconds']['median'])} ms", "per registration", f"{who}, median"),
             (confident, "of right ends state a confidence ≥ 0.9", wrong)]
 
@@ -90,7 +89,7 @@ def findings(run):
     """How far the first method's starts may lie, and how long the others take."""
     first, paired = run.summary["renderers"][0], run.summary["field_against_raycast"]
     items = [f"Capture range with {method_name(first['renderer'])}: "
-             f"{capture(first['mrpd_capture_range'] if run.has_one_view else first['capture_range'])}."]
+             f"{capture(first['capture_range'])}."]
     if run.has_one_view:
         items[0] += " With one view, successes are by their reprojection distance (mRPD), which leaves out the depth."
     if paired and paired["median_seconds"][0]:
@@ -147,10 +146,9 @@ def capture_table(renderers):
         end = (found or {}).get("end_interval")
         ended = "–" if not end else f"{whole(end['low_mm'])}–{whole(end['high_mm'])} mm: " + (
             f"{whole(end['successes'])} of {whole(end['starts'])}" if end["starts"] else "no starts")
-        rows.append([method_name(renderer["renderer"]), own_captures(renderer), together, ended, capture(renderer["mrpd_capture_range"]),
-                     capture(renderer["cumulative_capture_range"])])
-    return Table(["Method", "Patients' own ranges: mean (smallest to largest; 95 %)", "All starts together (95 % over patients)", "Ended by",
-                  "By mRPD, all starts", "Cumulative"], rows,
+        rows.append([method_name(renderer["renderer"]), own_captures(renderer), together, ended, capture(renderer["cumulative_capture_range"])])
+    return Table(["Method", "Patients' own ranges: mean (smallest to largest; 95 %)", "All starts together (95 % over patients)", "Ended by", "Cumulative"],
+                 rows,
                  "Capture range: the first interval of initial error with a success below 95 % ends it (van de Kraats et al. 2005). "
                  "Cumulative: the largest initial error with 95 % success up to it, where close starts make up for far ones")
 
@@ -158,27 +156,29 @@ def capture_table(renderers):
 def error_table(renderers):
     rows = []
     for renderer in renderers:
-        everything, good = renderer["tre_of_all_mm"], renderer["tre_of_successes_mm"]
-        rows.append([method_name(renderer["renderer"]), whole(renderer["starts"]), three(everything["median"]),
-                     f"{three(everything['q1'])}–{three(everything['q3'])}", three(everything["p95"]), three(renderer["tre_mm"]["max"]),
-                     whole(renderer["without_pose"]), f"{three(good['mean'])} ± {three(good['sd'])}",
+        everything, good = renderer["error_of_all_mm"], renderer["error_of_successes_mm"]
+        tre = renderer["tre_of_all_mm"]
+        rows.append([method_name(renderer["renderer"]), whole(renderer["starts"]), renderer["error"], three(everything["median"]),
+                     f"{three(everything['q1'])}–{three(everything['q3'])}", three(everything["p95"]),
+                     f"{three(good['mean'])} ± {three(good['sd'])}", depth_text(renderer["depth_of_all_mm"]),
+                     f"{three(tre['median'])}, {three(tre['p95'])}", three(renderer["tre_mm"]["max"]), whole(renderer["without_pose"]),
                      three(renderer["stated_pose_tre_of_successes_mm"]["mean"]), three(renderer["gold_uncertainty_mm"])])
-    return Table(["Method", "#Starts", "#Median", "#Quartiles", "#95th percentile", "#Largest with a pose", "#No pose",
-                  "#Mean ± SD of successes", "#Same against stated pose", "#Gold standard by itself"], rows,
-                 "TRE in mm over all registrations, one without a pose counting as infinitely far; then over successes only")
+    return Table(["Method", "#Starts", "Error", "#Median", "#Quartiles", "#95th percentile", "#Mean ± SD of successes",
+                  "#Depth off: median, 95th percentile", "#TRE: median, 95th percentile", "#Largest TRE with a pose", "#No pose",
+                  "#TRE of successes against stated pose", "#Gold standard by itself"], rows,
+                 "Errors in mm, TRE or with one view mRPD, over all registrations, one without a pose counting as infinitely far, and over "
+                 "successes; how far one view's depth is off")
 
 
 def threshold_table(renderers):
     rows = []
     for place, threshold in enumerate(renderers[0]["thresholds"]):
         for renderer in renderers:
-            rows.append([f"{whole(threshold['threshold_mm'])} mm", method_name(renderer["renderer"]), rate(renderer["thresholds"][place]),
-                         rate(renderer["mrpd_thresholds"][place])])
-    rows += [["gross failures: 10 mm or more, or no pose", method_name(renderer["renderer"]), rate(renderer["gross_failures"]),
-              rate(renderer["mrpd_gross_failures"])] for renderer in renderers]
-    return Table(["Error below", "Method", "#By TRE (95 % interval)", "#By mRPD (95 % interval)"], rows,
-                 "Share of all starts below other thresholds, by TRE and by the mean reprojection distance (mRPD), which does not "
-                 "count what one view cannot see")
+            rows.append([f"{whole(threshold['threshold_mm'])} mm", method_name(renderer["renderer"]), rate(renderer["thresholds"][place])])
+    rows += [["gross failures: 10 mm or more, or no pose", method_name(renderer["renderer"]), rate(renderer["gross_failures"])]
+             for renderer in renderers]
+    return Table(["Error below", "Method", "#Share (95 % interval)"], rows,
+                 f"Share of all starts below other thresholds, by {renderers[0]['error']}")
 
 
 def other_errors_table(renderers):
@@ -243,10 +243,10 @@ def paired_text(paired):
     if not paired:
         return None
     ends, test = paired.get("end_distance_mm"), paired.get("test")
-    is_tested = paired["common_starts"] >= LEAST_STARTS_OF_A_TEST
+    too_few = f"fewer than {paired['pairs_needed']} pairs: no test"
     text = Markup("%s, the %s given to both: %s and %s successes%s.") % (
         strong("Field against ray casting"), counted(paired["common_starts"], "start", "starts"), *map(whole, paired["successes"]),
-        f" (McNemar {p_text(paired['mcnemar_p'])})" if is_tested else "")
+        f" ({too_few})" if paired["mcnemar_p"] is None else f" (McNemar {p_text(paired['mcnemar_p'])})")
     if ends:
         over = ends["over_cases"]
         text += f" Where both succeeded their end poses lie {three(over['mean'])} mm apart (mean over the target and over "
@@ -262,22 +262,24 @@ def paired_text(paired):
             margin = three(ends["margin_mm"])
             text += (f" Over patients the two are equivalent within {margin} mm, and succeed alike: " if ends["is_equivalent"] else
                      f" Equivalence within {margin} mm is not shown over patients: ") + f"one-sided Student's test {p_text(ends['p'])}."
-    if test and is_tested:
-        text += (f" Over these starts TRE differs by {three(test['mean_difference_mm'])} mm on average (90 % interval "
+    differs = f" Over these starts the error differs by {three(paired['mean_difference_mm'])} mm on average"
+    if test:
+        text += (f"{differs} (90 % interval "
                  f"{three(test['low_90_mm'])} to {three(test['high_90_mm'])} mm; paired t-test {p_text(test['t_test_p'])}, Wilcoxon's "
                  f"signed-rank test {p_text(test['signed_rank_p'])}). These tests take starts for independent, which those of one patient "
                  "are not, and errors in opposite directions cancel in them: they show no equivalence.")
-    elif test:
-        text += f" Over these starts TRE differs by {three(test['mean_difference_mm'])} mm on average: too few starts for a test."
+    elif paired["pairs"]:
+        text += f"{differs}; {too_few}."
     return Text(text)
 
 
 def case_table(renderers):
     rows = [[entry["case"], method_name(renderer["renderer"]), whole(entry["starts"]), rate(entry), capture(entry["capture_range"]),
-             three(entry["tre_of_successes_mm"]["mean"]), three(entry["gold_uncertainty_mm"]), milliseconds(entry["seconds"]["median"]),
-             three(entry["evaluations"]["median"])] for renderer in renderers for entry in renderer["cases"]]
-    return Table(["Case", "Method", "#Starts", "#Success (95 % interval)", "#Capture range", "#Mean TRE of successes (mm)",
-                  "#Gold standard by itself (mm)", "#Median ms", "#Median evaluations"], rows,
+             entry["error"], three(entry["error_of_successes_mm"]["mean"]), depth_text(entry["depth_of_all_mm"]),
+             three(entry["gold_uncertainty_mm"]), milliseconds(entry["seconds"]["median"]), three(entry["evaluations"]["median"])]
+            for renderer in renderers for entry in renderer["cases"]]
+    return Table(["Case", "Method", "#Starts", "#Success (95 % interval)", "#Capture range", "by", "#Mean error of successes (mm)",
+                  "#Depth off: median, 95th percentile (mm)", "#Gold standard by itself (mm)", "#Median ms", "#Median evaluations"], rows,
                  "Per case: a patient, or one of a patient's poses (the paper's Table II)")
 
 
@@ -312,8 +314,8 @@ def section(run, title):
     if problems:
         blocks += [Text("What to mind:"), Items(problems)]
     drawn = [run_figure(run, "success-rate", "Success rate per interval of initial error", Markup(
-        "<b>Success against initial error</b> (the paper's Fig. 16). Dots: share of starts that end below %s mm; bars: 95 %% Wilson "
-        "intervals; dashed: 95 %%.") % limit),
+        "<b>Success against initial error</b> (the paper's Fig. 16). Dots: share of starts that end below %s mm %s; bars: 95 %% Wilson "
+        "intervals; dashed: 95 %%.") % (limit, run.error)),
         run_figure(run, "tre-scatter", "Initial against final error", Markup(
             "<b>Where registrations started and ended</b>, one mark each; of very many only a part, as the title says.")),
         run_figure(run, "tre-histogram", "Histogram of the error after registration", Markup(
@@ -323,7 +325,7 @@ def section(run, title):
             "<b>Verdict and confidence against the error.</b> Right ends belong to the lower right; crosses are ends that the verdict calls "
             "not found.")))
     blocks += [Figures(drawn), success_table(summary), capture_table(renderers), error_table(renderers), threshold_table(renderers)]
-    if any(case["views"] == 1 for case in summary["cases"]):
+    if run.has_one_view:
         blocks.append(Text(Markup("%s A single view hardly shows the depth along its rays, so a TRE says little; the reprojection distance "
                                   "(mRPD) measures what the view can show.") % strong("One view.")))
     blocks += [verdict_table(renderers), confidence_table(renderers), other_errors_table(renderers), *over_patients(renderers),
@@ -338,5 +340,6 @@ def comparison(runs):
     if len(runs) < 2 or any([entry["high_mm"] for entry in group] != [entry["high_mm"] for entry in groups[0][1]] for _, group in groups):
         return None
     which = f"the first {MOST_CURVES} runs" if len(groups) > MOST_CURVES else "each run"
-    return Figure(svg_of(success_rates(groups[:MOST_CURVES])[0]), "image/svg+xml", "Success rate of every run per interval of initial error",
+    error = " or ".join(sorted({run.error for run in runs[:MOST_CURVES]}))
+    return Figure(svg_of(success_rates(groups[:MOST_CURVES], error)[0]), "image/svg+xml", "Success rate of every run per interval of initial error",
                   Markup("<b>Success against initial error</b>, the first method of %s; bars: 95 %% Wilson intervals.") % which)

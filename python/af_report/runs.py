@@ -45,10 +45,12 @@ class Run:
     @cached_property
     def starts(self):
         """What figures and lists need of registrations.csv."""
-        columns = ("initial_tre_mm", "tre_mm", "confidence")
+        columns = ("initial_tre_mm", "tre_mm", "mrpd_mm", "confidence")
+        one_view = {case["case"] for case in self.summary["cases"] if case["views"] == 1}
         starts = []
         for row in self.rows("registrations.csv"):
             start = {key: row.number(key) for key in columns if key in row or key != "confidence"}
+            start["error_mm"] = start["mrpd_mm" if row.text("case") in one_view else "tre_mm"]
             for key in ("case", "renderer", "start_index", "success", "stop_reason", "error", *(["verdict"] if "verdict" in row else [])):
                 start[key] = row.text(key)
             starts.append(start)
@@ -59,9 +61,13 @@ class Run:
         return f"run-{file_name_part(self.name)}"
 
     @property
+    def error(self):
+        """By what its ends are counted: TRE, with one view mRPD, or both."""
+        return self.summary["renderers"][0]["error"]
+
+    @property
     def has_one_view(self):
-        cases = self.summary["cases"]
-        return bool(cases) and all(case["views"] == 1 for case in cases)
+        return any(case["views"] == 1 for case in self.summary["cases"])
 
     def is_default(self, renderer):
         method = self.summary["method"]

@@ -49,13 +49,14 @@ def methods_markdown(rows):
         lines.append([row.text("run"), row.text("case"), row.text("method"), row.text("renderer"), " / ".join(band_text(row, band) for band in BANDS),
                       " / ".join(row.text(f"starts_{band}_mm") for band in BANDS),
                       " / ".join(fixed(row.number(f"rotation_share_{band}_mm"), 2) for band in BANDS), row.text("capture_range_mm"),
-                      row.text("gross_failures"), f"{fixed(row.number('mean_tre_mm'), 3)}, {fixed(row.number('median_tre_mm'), 3)}",
-                      f"{row.text('mrpd_successes')} of {row.text('starts')}, {fixed(row.number('median_mrpd_mm'), 3)}",
+                      row.text("gross_failures"),
+                      f"{row.text('error')} {fixed(row.number('mean_error_mm'), 3)}, {fixed(row.number('median_error_mm'), 3)}",
+                      f"{fixed(row.number('median_depth_mm'), 2)}, {fixed(row.number('p95_depth_mm'), 2)}",
                       f"{fixed(row.number('rotation_bias_deg'), 3)}, {fixed(row.number('translation_bias_mm'), 3)}",
                       fixed(row.number("median_drr_count"), 0), fixed(row.number("median_seconds"), 4)])
     return markdown(["Run", "Case", "Method", "Renderer", "Success % [95 % interval], starts 0-8 / 8-16 / 16-30 mm", "of starts",
-                     "of whose size is rotation", "Capture range, mm", "Gross failures", "TRE of successes, mm: mean, median",
-                     "Right by mRPD: starts, median mm", "Bias, deg and mm", "DRRs", "Seconds"], lines)
+                     "of whose size is rotation", "Capture range, mm", "Gross failures", "Error of successes, mm: mean, median",
+                     "Depth off, one view, mm: median, 95th percentile", "Bias, deg and mm", "DRRs", "Seconds"], lines)
 
 
 def crossed(keys, cells):
@@ -68,10 +69,10 @@ def crossed(keys, cells):
 
 
 def screen_markdown(rows):
-    """Measures against optimisers: success of the first two bands and the median TRE."""
+    """Measures against optimisers: success of the first two bands and the median error."""
     return crossed(["Case", "Renderer", "Preset", "Measure"], [
         ((row.text("case"), row.text("renderer"), row.text("preset"), row.text("similarity")), row.text("optimizer"),
-         f"{band_text(row, BANDS[0], False)} / {band_text(row, BANDS[1], False)}, {fixed(row.number('median_tre_mm'), 3)}") for row in rows])[1]
+         f"{band_text(row, BANDS[0], False)} / {band_text(row, BANDS[1], False)}, {fixed(row.number('median_error_mm'), 3)}") for row in rows])[1]
 
 
 def studies_markdown(rows):
@@ -81,7 +82,7 @@ def studies_markdown(rows):
         end = row.text("run").rfind("-" + row.text("preset")) if row.text("preset") else -1
         if end >= 0:
             cells.append(((row.text("run")[:end], row.text("renderer")), row.text("run")[end + 1:],
-                          f"{' / '.join(band_text(row, band, False) for band in BANDS)}, {fixed(row.number('median_tre_mm'), 3)}, "
+                          f"{' / '.join(band_text(row, band, False) for band in BANDS)}, {fixed(row.number('median_error_mm'), 3)}, "
                           f"{fixed(1000 * row.number('median_seconds'), 1)}"))
     columns, text = crossed(["Study", "Renderer"], cells)
     return text if len(columns) > 1 else ""
@@ -94,13 +95,14 @@ def pairs_markdown(rows):
         three = lambda name: fixed(row.number(name), 3)  # noqa: E731, B023
         over = (f"{three('mean_distance_mm')} [{three('bootstrap_low_mm')}, {three('bootstrap_high_mm')}], Student "
                 f"[{three('student_low_mm')}, {three('student_high_mm')}]")
-        lines.append([row.text("run"), row.text("common_starts"), f"{row.text('successes_field')}, {row.text('successes_raycast')}",
+        lines.append([row.text("run"), row.text("common_starts"),
+                      f"{row.text('successes_field')}, {row.text('successes_raycast')}; {row.text('mcnemar_p')}",
                       row.text("pairs"), row.text("patients"), over, f"{three('p95_distance_mm')}, {three('max_distance_mm')}",
-                      f"{row.text('margin_mm')} mm: {row.text('claim')}", three("tre_difference_mm"),
+                      f"{row.text('margin_mm')} mm: {row.text('claim')}", three("error_difference_mm"),
                       f"{fixed(row.number('median_seconds_field'), 4)}, {fixed(row.number('median_seconds_raycast'), 2)}"])
-    return markdown(["Run", "Common starts", "Successes: field, ray casting", "Pairs", "Patients",
+    return markdown(["Run", "Common starts", "Successes: field, ray casting; McNemar's p", "Pairs", "Patients",
                      "End poses apart, mm: mean over patients [95 % intervals]", "of pairs: 95th percentile, largest", "Equivalent within",
-                     "TRE, field less ray casting, mm", "Seconds"], lines) if lines else ""
+                     "Error, field less ray casting, mm", "Seconds"], lines) if lines else ""
 
 
 def distances_markdown(rows):
@@ -159,32 +161,33 @@ def is_kind(group):
     return group not in ("all", "odd", "even", "real")
 
 
-def population_markdown(rows, error):
+def population_markdown(rows):
     lines = []
     for row in rows:
         if is_kind(row.text("group")):
             continue
-        text, number = (lambda name: row.text(f"{error}_{name}")), (lambda name: row.number(f"{error}_{name}"))  # noqa: E731, B023
-        starts = row.number("starts")
+        text, number = row.text, row.number
+        starts = number("starts")
         own, low, high = (fixed(number(f"patients_capture_{name}"), 1) for name in ("mean_mm", "bootstrap_low_mm", "bootstrap_high_mm"))
         whole = ">= " if text("capture_ended_by") == "last interval" else ""
-        lines.append([row.text("condition"), row.text("group"), f"{row.text('patients')}, {text('patients_with_failures')}", row.text("starts"),
+        lines.append([text("condition"), text("group"), f"{text('patients')}, {text('patients_with_failures')}", text("starts"), text("error"),
                       per_cent(number("rate"), 1), *(f"{per_cent(number(f'{kind}_low'), 1)} to {per_cent(number(f'{kind}_high'), 1)}"
                                                      for kind in ("bootstrap", "student")),
                       " / ".join(per_cent(number(f"below_{limit}_mm") / starts, 1) for limit in (1, 5)),
                       whole + fixed(number("capture_mm"), 1),
                       f"{'>= ' if number('patients_capture_lower_bounds') > 0 else ''}{own} ({low} to {high})",
-                      fixed(row.number("median_tre_mm"), 2), fixed(row.number("median_seconds"), 3)])
-    return markdown(["Condition", "Group", "Patients, of whom lost a start", "Starts", "Success, %", "Bootstrap", "Student's", "Below 1 / 5 mm, %",
-                     "Capture range of all, mm", "Patients' own, mean, mm", "Median TRE, mm", "Seconds"], lines)
+                      fixed(number("median_error_mm"), 2), f"{fixed(number('median_depth_mm'), 1)}, {fixed(number('p95_depth_mm'), 1)}",
+                      fixed(number("median_seconds"), 3)])
+    return markdown(["Condition", "Group", "Patients, of whom lost a start", "Starts", "Error", "Success, %", "Bootstrap", "Student's",
+                     "Below 1 / 5 mm, %", "Capture range of all, mm", "Patients' own, mean, mm", "Median error, mm",
+                     "Depth off, one view, mm: median, 95th percentile", "Seconds"], lines)
 
 
 def kinds_markdown(rows):
     """A column per kind of patient, in the order in which they come."""
     kinds = list(dict.fromkeys(row.text("group") for row in rows if is_kind(row.text("group")) or row.text("group") == "real"))
     conditions = list(dict.fromkeys(row.text("condition") for row in rows))
-    cells = {(row.text("condition"), row.text("group")): " / ".join(per_cent(row.number(f"{error}_rate"), 1) for error in ("tre", "mrpd")) + ", " +
-             " / ".join(fixed(row.number(f"{error}_capture_mm"), 1) for error in ("tre", "mrpd")) for row in rows}
+    cells = {(row.text("condition"), row.text("group")): f"{per_cent(row.number('rate'), 1)}, {fixed(row.number('capture_mm'), 1)}" for row in rows}
     return markdown(["Condition", *kinds], [[condition, *(cells.get((condition, kind), "-") for kind in kinds)] for condition in conditions])
 
 
@@ -192,8 +195,8 @@ def population(folder):
     rows = list(rows_of(folder / "population.csv"))
     commits = sorted({row.text("commit") for row in rows})
     limit = next((f"{row.number('success_mm'):g}" for row in rows), "-")
-    return (f"By TRE below {limit} mm:\n\n{population_markdown(rows, 'tre')}\nBy mRPD below the same, which is the one to read with one view:\n\n"
-            f"{population_markdown(rows, 'mrpd')}\nKinds of patients: success, % (TRE / mRPD), capture range of all starts, mm (TRE / mRPD):\n\n"
+    return (f"Success is an error below {limit} mm: TRE, with one view mRPD, whose depth is a column of its own.\n\n{population_markdown(rows)}\n"
+            "Kinds of patients: success, %, capture range of all starts, mm:\n\n"
             f"{kinds_markdown(rows)}\nCommits of the programs: {', '.join(commits)}."
             f"{' Conditions are of different programs.' if len(commits) > 1 else ''}\n")
 

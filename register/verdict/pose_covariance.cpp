@@ -12,6 +12,7 @@ namespace af::registration {
 namespace {
 
 constexpr double kNormalQuantile95 = 1.6448536269514722;
+constexpr double kNormalHalfWidth95 = 1.959963984540054;
 
 using MotionMatrix = Eigen::Matrix<double, 3, 6>;
 
@@ -84,6 +85,16 @@ PredictedTre predicted_tre(const PoseMatrix& covariance,
   tre.upper_95_mm =
       std::sqrt(mean * std::pow(1.0 - ninth + kNormalQuantile95 * std::sqrt(ninth), 3));
   return tre;
+}
+
+double depth_95_mm(const PoseMatrix& covariance,
+                   const PoseFrame& frame,
+                   const Eigen::Vector3d& point_ct_mm,
+                   const Eigen::Vector3d& source_room_mm) {
+  const Eigen::Vector3d point_room_mm = pose_from_parameters(frame, {}) * point_ct_mm;
+  const PoseVector along_beam = motion_of(point_room_mm - frame.center_room_mm).transpose() *
+                                (point_room_mm - source_room_mm).normalized();
+  return kNormalHalfWidth95 * std::sqrt(along_beam.dot(covariance * along_beam));
 }
 
 std::array<double, 21> in_deg_mm(const PoseMatrix& covariance) {

@@ -46,6 +46,13 @@ PredictedTre predicted_tre(const PoseMatrix& covariance,
                            const PoseFrame& frame,
                            std::span<const Eigen::Vector3d> target_points_ct);
 
+/// 95 % half-width of a point's place along the beam that meets it (mm); NaN for a covariance that
+/// is not finite. \test DepthAlongTheBeam.IsThatOfDrawnPoses
+double depth_95_mm(const PoseMatrix& covariance,
+                   const PoseFrame& frame,
+                   const Eigen::Vector3d& point_ct_mm,
+                   const Eigen::Vector3d& source_room_mm);
+
 /// Upper triangle, row by row, in deg and mm.
 std::array<double, 21> in_deg_mm(const PoseMatrix& covariance);
 /// The inverse of in_deg_mm(): the matrix in rad and mm.

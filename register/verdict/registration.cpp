@@ -547,6 +547,8 @@ Judgement judgement_of(const RegistrationRecord& record) {
   if (!reasons.empty() && judgement.verdict == Verdict::Found)
     judgement.verdict = Verdict::Doubtful;
   reasons.insert(reasons.begin(), judgement.reason);
+  if (record.view_values.size() == 1 && judgement.verdict != Verdict::NotFound)
+    reasons.push_back(depth_text(record.uncertainty.depth_95_mm));
   if (!result.clipped_along.empty())
     reasons.push_back("the start lay outside the field's range along " + result.clipped_along +
                       " and was clipped into it");

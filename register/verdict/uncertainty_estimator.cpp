@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "geometry/target_box.h"
 #include "register/problem/pose_target.h"
 #include "register/verdict/calibration.h"
 #include "register/verdict/pose_covariance.h"
@@ -102,11 +103,15 @@ double UncertaintyEstimator::add_covariance(const RegistrationResult& result,
       *information, views_, problem_->isocenter_point, options_.calibration_error_px);
   report.covariance_deg_mm = in_deg_mm(inflation.pose * *sandwich + by_cameras);
   if (problem_->target_points_ct.empty()) return UncertaintyReport::kNone;
-  const PredictedTre tre =
-      predicted_tre(inflation.tre * *sandwich + by_cameras, frame, problem_->target_points_ct);
+  const PoseMatrix of_target = inflation.tre * *sandwich + by_cameras;
+  const std::vector<Eigen::Vector3d>& target_ct = problem_->target_points_ct;
+  const PredictedTre tre = predicted_tre(of_target, frame, target_ct);
   report.tre_rms_mm = tre.rms_mm;
   report.tre_95_mm = tre.upper_95_mm;
-  return predicted_tre(*sandwich, frame, problem_->target_points_ct).rms_mm;
+  if (views_.size() == 1)
+    report.depth_95_mm =
+        depth_95_mm(of_target, frame, mean_point(target_ct), views_.front().camera.source_point);
+  return predicted_tre(*sandwich, frame, target_ct).rms_mm;
 }
 
 UncertaintyReport UncertaintyEstimator::report(const RegistrationResult& result,

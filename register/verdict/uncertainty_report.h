@@ -18,8 +18,11 @@ struct UncertaintyReport {
   /// true pose is the found pose followed by x_room -> p + t + Rz Ry Rx (x_room - p), about the
   /// room's axes, where p is the ROI centre at the found pose.
   std::array<double, kCovarianceSize> covariance_deg_mm = filled_with_nan();
-  double tre_rms_mm = kNone;     ///< the root of the expected mean squared TRE over the target box
-  double tre_95_mm = kNone;      ///< the TRE is below this with probability 0.95
+  double tre_rms_mm = kNone;  ///< the root of the expected mean squared TRE over the target box
+  double tre_95_mm = kNone;   ///< the TRE is below this with probability 0.95
+  /// With one view: the target's centre lies within this, to either side, along the beam with
+  /// probability 0.95.
+  double depth_95_mm = kNone;
   double inflation = kNone;      ///< what calibration multiplied the sandwich by for the covariance
   double tre_inflation = kNone;  ///< and for the TREs
   /// Probability that the registration succeeded (success_confidence()); a lower bound where
@@ -27,7 +30,13 @@ struct UncertaintyReport {
   double confidence = kNone;
 
   auto members() {
-    return std::tie(covariance_deg_mm, tre_rms_mm, tre_95_mm, inflation, tre_inflation, confidence);
+    return std::tie(covariance_deg_mm,
+                    tre_rms_mm,
+                    tre_95_mm,
+                    depth_95_mm,
+                    inflation,
+                    tre_inflation,
+                    confidence);
   }
 
  private:

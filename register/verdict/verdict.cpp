@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "base/sample_summary.h"
 
@@ -87,6 +88,15 @@ Judgement judged_confidence(const UncertaintyReport& report, std::size_t views) 
     return {Verdict::NotFound, right + percent_text(kLeastConfidence) + " wanted"};
   return {report.confidence >= 1.0 - kFoundRisk ? Verdict::Found : Verdict::Doubtful,
           right + percent_text(1.0 - kFoundRisk) + " wanted"};
+}
+
+std::string depth_text(double depth_95_mm) {
+  if (!std::isfinite(depth_95_mm)) return "depth along the beam not known";
+  const auto tenths = static_cast<std::int64_t>(std::ceil(10.0 * depth_95_mm));
+  const std::string text = tenths < 100
+                               ? std::to_string(tenths / 10) + "." + std::to_string(tenths % 10)
+                               : std::to_string((tenths + 9) / 10);
+  return "depth along the beam within " + text + " mm";
 }
 
 bool disagrees(std::size_t view, std::span<const ViewValue> values) {

@@ -78,6 +78,10 @@ std::vector<std::string> doubts_of(const RegistrationResult& result,
 /// TRE is predicted, the confidence is a lower bound, by which nothing is rejected.
 Judgement judged_confidence(const UncertaintyReport& report, std::size_t views);
 
+/// What one view leaves open of a pose that it shows: "depth along the beam within 24 mm", rounded
+/// up; NaN: not known.
+std::string depth_text(double depth_95_mm);
+
 /// Whether the other views agree with the pose much better than this one.
 bool disagrees(std::size_t view, std::span<const ViewValue> values);
 

@@ -54,26 +54,26 @@ def population_words(row):
 
 
 def population_cells(row):
-    """Of af-evaluate population: by TRE; conditions of one view by mRPD."""
-    error = "mrpd" if re.search(r"-1-", row["condition"]) else "tre"
+    """Of af-evaluate population: by TRE; conditions of one view by mRPD. Tables with both have prefixes."""
+    error = "" if "error" in row else "mrpd_" if re.search(r"-1-", row["condition"]) else "tre_"
 
     def of(column):
-        return number(row, f"{error}_{column}")
+        return number(row, error + column)
 
     starts = int(row["starts"])
-    ends_whole = "" if row[f"{error}_capture_ended_by"] == "failures" else ">= "
+    ends_whole = "" if row[f"{error}capture_ended_by"] == "failures" else ">= "
     mean_whole = ">= " if of("patients_capture_lower_bounds") > 0 else ""
     low, high = of("share_with_failures_low"), of("share_with_failures_high")
     return [
         row["patients"],
-        f"{row[f'{error}_successes']} of {starts}",
+        f"{row[f'{error}successes']} of {starts}",
         f"{100 * of('rate'):.1f} ({100 * of('bootstrap_low'):.1f} to {100 * of('bootstrap_high'):.1f})",
-        f"{row[f'{error}_patients_with_failures']}: {100 * low:.1f} to {100 * high:.1f}",
+        f"{row[f'{error}patients_with_failures']}: {100 * low:.1f} to {100 * high:.1f}",
         f"{100 * of('worst_patient_rate'):.1f}",
         f"{100 * of('below_1_mm') / starts:.1f} / {100 * of('below_5_mm') / starts:.1f}",
         f"{ends_whole}{of('capture_mm'):.0f} ({of('capture_bootstrap_low_mm'):.0f} to {of('capture_bootstrap_high_mm'):.0f})",
         f"{mean_whole}{of('patients_capture_mean_mm'):.1f}",
-        fixed(number(row, "median_tre_mm"), 2),
+        fixed(number(row, "median_error_mm" if "error" in row else "median_tre_mm"), 2),
     ]
 
 

@@ -158,20 +158,35 @@ class Pages(Copied):
             self.assertNotRegex((Path(page.FOLDER) / name).read_text(), r"url\(|@import|fetch\(|XMLHttpRequest|import |eval\(|</s")
 
     def test_test_no_hypothesis_on_a_few_starts(self):
-        test = {"mean_difference_mm": 0.1, "low_90_mm": 0, "high_90_mm": 1, "t_test_p": 0.01, "signed_rank_p": 0.01}
-        paired = {"common_starts": 4, "successes": [4, 4], "mcnemar_p": 1.0, "test": test}
-        self.assertNotRegex(registration.paired_text(paired).text, "McNemar|p =|Wilcoxon")
-        self.assertRegex(registration.paired_text({**paired, "common_starts": 20}).text, "McNemar p = 1.00.*Wilcoxon")
+        test = {"low_90_mm": 0, "high_90_mm": 1, "t_test_p": 0.01, "signed_rank_p": 0.01}
+        paired = {"common_starts": 4, "successes": [4, 4], "pairs": 4, "pairs_needed": 10, "mcnemar_p": None, "mean_difference_mm": 0.1}
+        text = registration.paired_text(paired).text
+        self.assertNotRegex(text, "McNemar|p =|Wilcoxon")
+        self.assertRegex(text, r"\(fewer than 10 pairs: no test\).*differs by 0.100 mm on average; fewer than 10 pairs: no test")
+        self.assertRegex(registration.paired_text({**paired, "common_starts": 20, "pairs": 20, "mcnemar_p": 1.0, "test": test}).text,
+                         "McNemar p = 1.00.*differs by 0.100 mm.*Wilcoxon")
 
     def test_say_of_one_view_what_its_mrpd_says(self):
         def one_view(summary):
             for case in summary["cases"]:
                 case["views"] = 1
-            summary["renderers"][0]["mrpd_success"].update(successes=1, starts=7, rate=1 / 7)
+            first = summary["renderers"][0]
+            for key in ("depth_of_all_mm", "depth_of_successes_mm"):
+                first[key].update(count=7, median=5.25, p95=23.5)
+            first.update(error="mRPD", successes=1, starts=7, rate=1 / 7)
+            first["error_of_successes_mm"]["mean"] = 0.456
         self.change("registration", one_view)
         text = Page(self.page()).words
         self.assertIn("14.3\u00a0%of 7 starts succeed by mRPD", text)
+        self.assertIn("0.456 mmmean mRPD of successesdepth off by 5.25 mm (median), 23.5 mm (95th percentile)", text)
+        self.assertIn("5.25, 23.5", text)
         self.assertIn("which leaves out the depth", text)
+        # The figures are of the same error, which the rows have beside their TREs.
+        (found,) = runs.find_runs([self.folder / "registration"])
+        rows = self.rows("registration/registrations.csv")
+        self.assertEqual([start["error_mm"] for start in found.starts], [float(row["mrpd_mm"]) for row in rows])
+        self.assertEqual([row[2] for row in figures.figures_of(found)["tre-scatter"]()[2]], [start["error_mm"] for start in found.starts])
+        self.assertIn("mRPD (mm)", figures.svg_of(figures.figures_of(found)["tre-histogram"]()[0]).decode())
 
     def test_say_how_the_xrays_were_made(self):
         def text_of(effects, ideal="false"):
@@ -325,12 +340,12 @@ class Program(Copied):
 class Tables(unittest.TestCase):
     def test_of_methods_have_a_line_per_run_and_hide_no_failure(self):
         row = {"run": "skull-fast", "case": "skull", "method": "fast gc bobyqa", "preset": "fast", "similarity": "gc", "optimizer": "bobyqa",
-               "renderer": "field", "starts": "400", "capture_range_mm": "at least 16", "gross_failures": "1", "mrpd_successes": "399"}
+               "renderer": "field", "starts": "400", "capture_range_mm": "at least 16", "gross_failures": "1", "error": "mRPD"}
         for band, starts, successes in (("0_8", 400, 399), ("8_16", 4, 4), ("16_30", 0, 0)):
             row.update({f"starts_{band}_mm": str(starts), f"successes_{band}_mm": str(successes), f"wilson_low_{band}_mm": "0.9",
                         f"wilson_high_{band}_mm": "1", f"rotation_share_{band}_mm": "0.5"})
-        for name in ("mean_tre_mm", "median_tre_mm", "rotation_bias_deg", "translation_bias_mm", "median_rotation_error_deg", "median_mrpd_mm",
-                     "median_drr_count", "median_seconds"):
+        for name in ("mean_error_mm", "median_error_mm", "median_depth_mm", "p95_depth_mm", "rotation_bias_deg", "translation_bias_mm",
+                     "median_rotation_error_deg", "median_drr_count", "median_seconds"):
             row[name] = "0.25"
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "table.csv"
@@ -341,11 +356,13 @@ class Tables(unittest.TestCase):
             said = run(path)
             self.assertEqual(said, path.with_suffix(".md").read_text())
             self.assertIn("| skull-fast | skull | fast gc bobyqa | field | 99.8 [90, 100] / 100 [90, 100] / - |", said)
+            self.assertIn("| at least 16 | 1 | mRPD 0.250, 0.250 | 0.25, 0.25 |", said)
             self.assertIn("| Study | Renderer | fast | paper |", said)
             self.assertIn("| skull | field | paper | gc |  | 99.8 / 100, 0.250 |", run(path, "--screen"))
 
     def test_of_populations_take_conditions_of_any_name(self):
-        columns = ["condition", "group", "patients", "starts", "median_tre_mm", "median_seconds", "success_mm", "commit"]
+        columns = ["condition", "group", "patients", "starts", "error", "median_error_mm", "median_depth_mm", "p95_depth_mm", "median_seconds",
+                   "success_mm", "commit"]
         parts = ["rate", "student_low", "student_high", "bootstrap_low", "bootstrap_high", "capture_mm", "patients_capture_mean_mm",
                  "patients_capture_bootstrap_low_mm", "patients_capture_bootstrap_high_mm", "patients_capture_lower_bounds",
                  "patients_with_failures", "below_1_mm", "below_5_mm", "capture_ended_by"]
@@ -354,18 +371,22 @@ class Tables(unittest.TestCase):
             folder = Path(scratch)
             with (folder / "population.csv").open("w") as file:
                 writer = csv.writer(file)
-                writer.writerow(columns + [f"{error}_{part}" for error in ("tre", "mrpd") for part in parts])
-                writer.writerows([name, group, 3, 12, 0.1, 0.5, 2.5, "abc"] + (["0.8333", "nan", "nan", "0.5", "1", "4", "3", "2", "4", "1", "1", "10",
-                                  "10", "last interval"] * 2) for name in names for group in ("all", "odd", "spine"))
-            (folder / "patients.csv").write_text("condition,patient,capture_mm,mrpd_capture_mm\n" + "".join(
-                f"{name},spine-00{number},4,2\n" for name in names for number in (1, 2, 3)))
+                writer.writerow(columns + parts)
+                for name in names:
+                    error = ["mRPD", 0.1, 5, 12] if "-1-" in name else ["TRE", 0.1, "nan", "nan"]
+                    writer.writerows([name, group, 3, 12, *error, 0.5, 2.5, "abc", "0.8333", "nan", "nan", "0.5", "1", "4", "3", "2", "4", "1", "1",
+                                      "10", "10", "last interval"] for group in ("all", "odd", "spine"))
+            (folder / "patients.csv").write_text("condition,patient,capture_mm\n" + "".join(
+                f"{name},spine-00{number},4\n" for name in names for number in (1, 2, 3)))
             (folder / "intervals.csv").write_text("condition,error,low_mm,high_mm,starts,successes,bootstrap_low,bootstrap_high\n" + "".join(
-                f"{name},{error},{low},{low + 2},6,5,0.5,1\n" for name in names for error in ("tre", "mrpd") for low in (0, 2)))
+                f"{name},{'mRPD' if '-1-' in name else 'TRE'},{low},{low + 2},6,5,0.5,1\n" for name in names for low in (0, 2)))
             said = run(folder)
-            self.assertIn("| clean-2-robust | all | 3, 1 | 12 | 83.3 | 50.0 to 100.0 | - to - | 83.3 / 83.3 | >= 4.0 | >= 3.0 (2.0 to 4.0) | 0.10 | 0.500 |", said)
-            self.assertIn("| word | 83.3 / 83.3, 4.0 / 4.0 |", said)
+            line = "| 12 | {} | 83.3 | 50.0 to 100.0 | - to - | 83.3 / 83.3 | >= 4.0 | >= 3.0 (2.0 to 4.0) | 0.10 | {} | 0.500 |"
+            self.assertIn("| clean-2-robust | all | 3, 1 " + line.format("TRE", "-, -"), said)
+            self.assertIn("| clean-1-robust | all | 3, 1 " + line.format("mRPD", "5.0, 12.0"), said)
+            self.assertIn("| word | 83.3, 4.0 |", said)
             drawn = (folder / "success.svg").read_text()
-            for title in ("clean-2 views", "clean-1 view, by mRPD", "word"):
+            for title in ("clean-2 views, by TRE", "clean-1 view, by mRPD", "word, by TRE"):
                 self.assertIn(title, drawn)
             self.assertTrue((folder / "capture-range.png").exists())
 

@@ -29,6 +29,11 @@ TEST(TargetBox, PointsAreTheCentresOfEqualCells) {
   EXPECT_LT((points[5] - Vector3d(2.25, 11, -5.0 / 6)).norm(), kTreRoundingMm);
 }
 
+TEST(TargetBox, CenterIsTheMeanOfItsPoints) {
+  const Vector3d mean = mean_point(target_points({{0, 10, -5}, {3, 12, 0}}, 2.0));
+  EXPECT_LT((mean - Vector3d(1.5, 11, -2.5)).norm(), kTreRoundingMm);
+}
+
 TEST(TargetBox, RefusesABoxWithoutVolume) {
   EXPECT_THROW(target_points({{0, 0, 0}, {1, 0, 1}}), InputError);
   EXPECT_THROW(target_points({{0, 0, 0}, {1, -1, 1}}), InputError);

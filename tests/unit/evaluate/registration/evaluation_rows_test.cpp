@@ -10,12 +10,14 @@
 #include "base/stored_bytes.h"
 #include "evaluate/image_quality/image_quality_tables.h"
 #include "evaluate/registration/case_evaluation.h"
+#include "evaluate/registration/case_table.h"
 #include "evaluate/registration/method_comparison.h"
 #include "evaluate/registration/paired_statistics.h"
 #include "evaluate/registration/pose_distances.h"
 #include "evaluate/registration/registration_rows.h"
 #include "evaluate/registration/registration_statistics.h"
 #include "files/output_file.h"
+#include "support/io_checks.h"
 #include "support/test_paths.h"
 #include "unit/evaluate/camera_along_z.h"
 
@@ -195,23 +197,27 @@ TEST(RegistrationStatistics, CountSuccessBelowTheStatedThreshold) {
   EXPECT_EQ(registrations_table(rows, 5.0).text(2, "success"), "1");
 }
 
-TEST(RegistrationStatistics, HaveTheLadderOfMrpdToo) {
+TEST(RegistrationStatistics, OfOneViewHaveTheLadderOfMrpd) {
   Rows rows;
   for (std::int64_t i = 0; i < 5; ++i) rows.push_back(row("field", i, 1, 30.0));
   const std::vector<double> mrpd_mm = {0.5, 1.0, 2.4, 7.0, std::nan("")};
   for (std::size_t i = 0; i < 5; ++i) rows[i].errors.mrpd_mm = mrpd_mm[i];
+  const json of_two_views = renderer_statistics(rows, "field", {2, 2.0});
+  EXPECT_EQ(of_two_views["error"], "TRE");
+  EXPECT_EQ(of_two_views["successes"], 0);
+  for (RegistrationRow& each : rows) each.has_one_view = true;
   const json result = renderer_statistics(rows, "field", {2, 2.0});
   const std::vector<int> below = {1, 2, 3, 3, 4};
   for (std::size_t i = 0; i < below.size(); ++i) {
-    EXPECT_EQ(result["mrpd_thresholds"][i]["successes"], below[i]) << i;
-    EXPECT_EQ(result["mrpd_thresholds"][i]["starts"], 5) << i;
-    EXPECT_EQ(result["mrpd_thresholds"][i]["threshold_mm"],
-              result["thresholds"][i]["threshold_mm"]);
+    EXPECT_EQ(result["thresholds"][i]["successes"], below[i]) << i;
+    EXPECT_EQ(result["thresholds"][i]["starts"], 5) << i;
   }
-  EXPECT_EQ(result["successes"], 0);
-  EXPECT_EQ(result["mrpd_success"]["successes"], 3);
-  EXPECT_EQ(result["mrpd_success"]["threshold_mm"], 2.5);
-  EXPECT_EQ(result["mrpd_capture_range"]["initial_tre_mm"], 0.0);
+  EXPECT_EQ(result["error"], "mRPD");
+  EXPECT_EQ(result["successes"], 3);
+  EXPECT_EQ(result["intervals"][0]["successes"], 3);
+  EXPECT_EQ(result["capture_range"]["initial_tre_mm"], 0.0);
+  rows[0].has_one_view = false;
+  EXPECT_EQ(renderer_statistics(rows, "field", {2, 2.0})["error"], "TRE or mRPD");
 }
 
 TEST(RegistrationStatistics, HaveCaptureRangesOfPatientsAndOverThem) {
@@ -316,11 +322,11 @@ TEST(RegistrationStatistics, IntervalsOverCasesNeedSeveral) {
   EXPECT_EQ(over["rate"]["high"], 1.0);
   EXPECT_EQ(over["rate"]["cases"], 2);
   EXPECT_EQ(over["rate"]["is_optimistic"], true);
-  EXPECT_DOUBLE_EQ(over["mean_tre_of_successes_mm"]["low"].get<double>(), 0.2);
-  EXPECT_DOUBLE_EQ(over["mean_tre_of_successes_mm"]["high"].get<double>(), 0.4);
+  EXPECT_DOUBLE_EQ(over["mean_error_of_successes_mm"]["low"].get<double>(), 0.2);
+  EXPECT_DOUBLE_EQ(over["mean_error_of_successes_mm"]["high"].get<double>(), 0.4);
   // Student's quantile of one degree of freedom is tan(0.475 pi) = 12.7062: 0.3 +- 12.7062 * 0.1 of
   // the TRE; a rate of 0.75 +- 12.7062 * 0.25 ends at 0 and 1.
-  EXPECT_NEAR(over["mean_tre_of_successes_mm"]["student_high"].get<double>(), 1.57062, 1e-5);
+  EXPECT_NEAR(over["mean_error_of_successes_mm"]["student_high"].get<double>(), 1.57062, 1e-5);
   EXPECT_EQ(over["rate"]["student_low"], 0.0);
   EXPECT_EQ(over["rate"]["student_high"], 1.0);
 }
@@ -363,18 +369,45 @@ TEST(RegistrationStatistics, OfOneViewAreByMrpd) {
   Rows rows = {row("field", 0, 1, 40.0), row("field", 1, 1, 5.0)};
   rows[0].errors.mrpd_mm = 0.4;
   rows[1].errors.mrpd_mm = 5.0;
+  rows[0].errors.depth_mm = 39.0;
+  rows[1].errors.depth_mm = 1.0;
   for (RegistrationRow& of_view : rows) {
     of_view.has_one_view = true;
     of_view.uncertainty.confidence = of_view.errors.mrpd_mm < 1.0 ? 0.99 : 0.1;
   }
   const json result = renderer_statistics(rows, "field", {});
-  EXPECT_EQ(result["successes"], 0);
-  EXPECT_EQ(result["gross_failures"]["successes"], 1);
-  EXPECT_EQ(result["mrpd_gross_failures"]["successes"], 0);
+  EXPECT_EQ(result["successes"], 1);
+  EXPECT_EQ(result["gross_failures"]["successes"], 0);
+  EXPECT_EQ(result["capture_range"]["initial_tre_mm"], 0.0);
+  EXPECT_EQ(result["error_of_successes_mm"]["mean"], 0.4);
+  EXPECT_EQ(result["error_of_all_mm"]["max"], 5.0);
+  EXPECT_EQ(result["tre_of_all_mm"]["max"], 40.0);
+  EXPECT_EQ(result["depth_of_successes_mm"]["median"], 39.0);
+  EXPECT_EQ(result["depth_of_all_mm"]["median"], 20.0);
+  EXPECT_DOUBLE_EQ(result["depth_of_all_mm"]["p95"].get<double>(), 1.0 + 0.95 * 38.0);
+  const CsvTable table = registrations_table(rows);
+  EXPECT_EQ(table.text(0, "success"), "1");
+  EXPECT_EQ(table.text(1, "success"), "0");
+  EXPECT_EQ(table.text(0, "depth_mm"), "39");
+  const CsvTable cases = case_table(json::array({result}));
+  EXPECT_EQ(cases.text(0, "error"), "mRPD");
+  EXPECT_EQ(cases.text(0, "successes"), "1");
+  EXPECT_EQ(cases.number(0, "mean_error_of_successes_mm"), 0.4);
+  EXPECT_EQ(cases.number(0, "median_depth_of_all_mm"), 20.0);
   EXPECT_EQ(result["failures_by_reason"], json({{"other optimum", 1}}));
   EXPECT_EQ(result["errors_of_successes"]["mrpd_mm"]["count"], 1);
   EXPECT_EQ(result["uncertainty"]["confidence"]["failures"], 1);
   EXPECT_EQ(result["uncertainty"]["confidence"]["roc_area"], 1.0);
+}
+
+// The depth of two views is no column's number; an end without a pose is infinitely deep.
+TEST(RegistrationStatistics, HaveDepthOfOneViewAlone) {
+  Rows rows = {row("field", 0, 1, 0.2), row("field", 1, 1, std::nan(""))};
+  EXPECT_EQ(renderer_statistics(rows, "field", {})["depth_of_all_mm"]["count"], 0);
+  rows[1].has_one_view = true;
+  const json depth = renderer_statistics(rows, "field", {})["depth_of_all_mm"];
+  EXPECT_EQ(depth["count"], 1);
+  EXPECT_EQ(depth["median"], "inf");
 }
 
 TEST(Warnings, AreGivenWherePatientsAreTooFew) {
@@ -408,18 +441,51 @@ TEST(PairedStatistics, TakeOnlyStartsThatBothWereGiven) {
   const json result = paired_statistics(rows, {0.5});
   EXPECT_EQ(result["common_starts"], 3);
   EXPECT_EQ(result["successes"], json({2, 3}));
-  // Start 3 alone is discordant: both of the two ways are equally probable.
-  EXPECT_EQ(result["mcnemar_p"], 1.0);
   EXPECT_EQ(result["median_seconds"], json({0.2, 40.0}));
   EXPECT_EQ(result["pairs"], 2);
-  const json& test = result["test"];
-  EXPECT_NEAR(test["mean_difference_mm"].get<double>(), -0.05, 1e-15);
-  // Differences -0.1 and 0: one that is not zero cannot be significant.
+  EXPECT_NEAR(result["mean_difference_mm"].get<double>(), -0.05, 1e-15);
+  // One case says nothing about others.
+  EXPECT_TRUE(result["mean_difference_over_cases_mm"]["low"].is_null());
+}
+
+/// Both succeed but from the last start, and field ends 0.1 mm closer from the first.
+Rows paired_rows(std::int64_t starts) {
+  Rows rows;
+  for (std::int64_t start = 0; start < starts; ++start) {
+    rows.push_back(row("field", start, 1, start == 0 ? 0.5 : start + 1 == starts ? 9.0 : 0.6));
+    rows.push_back(row("raycast", start, 1, 0.6));
+  }
+  return rows;
+}
+
+TEST(PairedStatistics, TestNothingOnFewerThanTenPairs) {
+  const json nine = paired_statistics(paired_rows(9), {0.5});
+  EXPECT_TRUE(nine["mcnemar_p"].is_null());
+  EXPECT_FALSE(nine.contains("test"));
+  const json ten = paired_statistics(paired_rows(10), {0.5});
+  // One discordant start: both of the two ways are equally probable.
+  EXPECT_EQ(ten["mcnemar_p"], 1.0);
+  EXPECT_FALSE(ten.contains("test")) << "nine of the ten are pairs of successes";
+  const json test = paired_statistics(paired_rows(11), {0.5})["test"];
+  // One difference that is not zero cannot be significant.
   EXPECT_EQ(test["signed_rank_p"], 1.0);
   EXPECT_EQ(test["margin_mm"], 0.5);
   EXPECT_GT(test["equivalence_power"].get<double>(), 0.0);
-  // One case says nothing about others.
-  EXPECT_TRUE(result["mean_difference_over_cases_mm"]["low"].is_null());
+}
+
+// Field's ends lie 30 mm deeper, which one view does not show: both succeed, and alike.
+TEST(PairedStatistics, OfOneViewAreByMrpd) {
+  Rows rows;
+  for (std::int64_t start = 0; start < 10; ++start)
+    for (const char* renderer : {"field", "raycast"}) {
+      rows.push_back(row(renderer, start, 1, std::string(renderer) == "field" ? 30.0 : 0.5));
+      rows.back().has_one_view = true;
+      rows.back().errors.mrpd_mm = 0.3;
+    }
+  const json result = paired_statistics(rows, {0.5});
+  EXPECT_EQ(result["successes"], json({10, 10}));
+  EXPECT_EQ(result["mean_difference_mm"], 0.0);
+  EXPECT_EQ(result["test"]["signed_rank_p"], 1.0);
 }
 
 TEST(PairedStatistics, OverCasesResampleCases) {
@@ -592,6 +658,7 @@ TEST(RegisteredRow, MeasuresTheEndAgainstBothPoses) {
   EXPECT_EQ(found.final_deg_mm[5], 0.25);
   EXPECT_EQ(found.errors.translation_mm, 0.25);
   EXPECT_EQ(found.errors.rotation_deg, 0.0);
+  EXPECT_TRUE(found.has_one_view);
   EXPECT_EQ(registrations_table(Rows{found}).text(0, "chain"), "wide-edges");
   EXPECT_EQ(registrations_table(Rows{found}).text(0, "verdict"), "") << "nothing was judged";
 }
@@ -605,6 +672,7 @@ TEST(RegisteredRow, OfARegistrationThatThrowsIsAFailure) {
       yardstick_at_origin());
   EXPECT_EQ(found.stop_reason, "error");
   EXPECT_EQ(found.error, "the histogram is empty");
+  EXPECT_TRUE(found.has_one_view) << "of the case, not of the end";
   EXPECT_TRUE(std::isnan(found.tre_mm));
   EXPECT_EQ(registrations_table(Rows{found}).text(0, "success"), "0");
 }
@@ -636,7 +704,9 @@ EvaluationRun run_with_ends(const test::ScratchFolder& folder, const Rows& rows)
   run.summary["cases"] = json::array({{{"case", "skull"},
                                        {"gold_room_from_ct", gold},
                                        {"center_ct_mm", {1, 2, 3}},
-                                       {"target_box_ct_mm", {{-9, -8, -7}, {11, 12, 13}}}}});
+                                       {"target_box_ct_mm", {{-9, -8, -7}, {11, 12, 13}}},
+                                       {"views", rows.front().has_one_view ? 1 : 2}}});
+  run.summary["provenance"]["input_sha256"] = {{"skull: xray A", "aa"}, {"skull: xray B", "bb"}};
   run.summary["success_tre_mm"] = kSuccessTreMm;
   run.summary["method"] = {{"preset", "fast"}, {"similarity", "gc"}, {"optimizer", "gradient"}};
   run.summary["renderers"] = json::array({renderer_statistics(rows, "field", {8, 2.0})});
@@ -654,7 +724,6 @@ TEST(MethodComparison, OfAHandBuiltRunIsTheKnownOne) {
   rows[1].final_deg_mm = {0, 0.6, 0, 0, 2, 0};
   rows[4].final_deg_mm = {0, 0, 0, 0, 3, 0};
   for (RegistrationRow& each : rows) each.drr_count = 100 + each.start_index;
-  rows[0].errors.mrpd_mm = 0.1;
   const CsvTable table = methods_table({run_with_ends(folder, rows)});
   ASSERT_EQ(table.row_count(), 1u);
   EXPECT_EQ(table.text(0, "method"), "fast gc gradient");
@@ -665,8 +734,8 @@ TEST(MethodComparison, OfAHandBuiltRunIsTheKnownOne) {
   EXPECT_EQ(table.text(0, "successes_8_16_mm"), "0");
   EXPECT_EQ(table.text(0, "starts_8_16_mm"), "1");   // 8 mm belongs to the band that begins there
   EXPECT_EQ(table.text(0, "starts_16_30_mm"), "1");  // 31 mm lies beyond all
-  EXPECT_DOUBLE_EQ(table.number(0, "mean_tre_mm"), 0.3);
-  EXPECT_DOUBLE_EQ(table.number(0, "median_tre_mm"), 0.3);
+  EXPECT_DOUBLE_EQ(table.number(0, "mean_error_mm"), 0.3);
+  EXPECT_DOUBLE_EQ(table.number(0, "median_error_mm"), 0.3);
   EXPECT_DOUBLE_EQ(table.number(0, "translation_bias_mm"), 2.0);
   EXPECT_DOUBLE_EQ(table.number(0, "rotation_bias_deg"), std::hypot(0.1, 0.2));
   EXPECT_EQ(table.number(0, "median_drr_count"), 102.0);
@@ -674,7 +743,27 @@ TEST(MethodComparison, OfAHandBuiltRunIsTheKnownOne) {
   EXPECT_EQ(table.text(0, "gross_failures"), "1");  // the one without a pose
   // Wilson's interval of 2 of 2 begins at 2 / (2 + 1.96^2).
   EXPECT_NEAR(table.number(0, "wilson_low_0_8_mm"), 0.34, 5e-3);
-  EXPECT_EQ(table.number(0, "mrpd_successes"), 1.0);
+  EXPECT_EQ(table.text(0, "error"), "TRE");
+  EXPECT_EQ(table.text(0, "median_depth_mm"), "nan");
+}
+
+TEST(MethodComparison, OfOneViewIsByMrpdWithDepthBesideIt) {
+  const test::ScratchFolder folder;
+  Rows rows = {row("field", 0, 1, 30.0), row("field", 1, 1, 40.0), row("field", 2, 1, 5.0)};
+  const std::vector<double> mrpd_mm = {0.2, 0.6, 4.0};
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    rows[i].has_one_view = true;
+    rows[i].errors.mrpd_mm = mrpd_mm[i];
+    rows[i].errors.depth_mm = rows[i].tre_mm;
+    rows[i].final_deg_mm = {};
+  }
+  const CsvTable table = methods_table({run_with_ends(folder, rows)});
+  EXPECT_EQ(table.text(0, "error"), "mRPD");
+  EXPECT_EQ(table.text(0, "successes_0_8_mm"), "2");
+  EXPECT_EQ(table.text(0, "gross_failures"), "0");
+  EXPECT_DOUBLE_EQ(table.number(0, "median_error_mm"), 0.4);
+  EXPECT_DOUBLE_EQ(table.number(0, "median_depth_mm"), 35.0);
+  EXPECT_DOUBLE_EQ(table.number(0, "p95_depth_mm"), 39.5);
 }
 
 TEST(MethodComparison, TakesThresholdTargetAndCaptureRangeFromTheSummary) {
@@ -748,6 +837,8 @@ TEST(PoseDistances, OverPatientsTakeTheirMeansAlike) {
   const CsvTable table = patient_distances_table(found);
   EXPECT_EQ(table.text(0, "claim"), "yes");
   EXPECT_EQ(table.text(1, "claim"), "too few patients");
+  EXPECT_EQ(table.text(1, "p"), "fewer than 10 patients");
+  EXPECT_LT(table.number(0, "p"), 0.05);
   EXPECT_EQ(table.text(1, "patients"), "1");
   EXPECT_EQ(distances_over_patients(rows, 0.05)[0].equivalence.is_shown(), false);
 }
@@ -796,6 +887,30 @@ TEST(PoseDistances, OfARotationDependOnWhereTheBoxIs) {
     EXPECT_NEAR(table.number(0, std::string(column) + "_rotation_deg"), 1.0, 1e-6) << column;
 }
 
+TEST(PoseDistances, RefuseRunsOfDifferentXrays) {
+  const test::ScratchFolder a;
+  const test::ScratchFolder b;
+  Rows rows = {row("field", 0, 1, 0.2)};
+  rows[0].final_deg_mm = {};
+  const EvaluationRun first = run_with_ends(a, rows);
+  EvaluationRun second = run_with_ends(b, rows);
+  EXPECT_EQ(pose_distances({first, second}).size(), 1u);
+  json& hashes = second.summary["provenance"]["input_sha256"];
+  const auto refusal = [&] {
+    return test::message_of<InputError>([&] { pose_distances({first, second}); });
+  };
+  hashes["skull: xray B"] = "other";
+  EXPECT_THAT(refusal(),
+              testing::AllOf(testing::HasSubstr(a.path().filename().string()),
+                             testing::HasSubstr(b.path().filename().string()),
+                             testing::HasSubstr("case skull, view B")));
+  hashes.erase("skull: xray B");
+  EXPECT_THAT(refusal(), testing::HasSubstr("case skull, view B"));
+  // Another program's poses, of X-rays that are not there, state none.
+  hashes = json::object();
+  EXPECT_EQ(pose_distances({first, second}).size(), 1u);
+}
+
 TEST(PoseDistances, OfARunThatStatesNoTargetAreAFileError) {
   const test::ScratchFolder folder;
   EvaluationRun run = run_with_ends(folder, {row("field", 0, 1, 0.2)});
@@ -808,7 +923,7 @@ TEST(PoseDistances, OfARunThatStatesNoTargetAreAFileError) {
 TEST(MethodComparison, OfARunWithoutSuccessHasNoErrors) {
   const test::ScratchFolder folder;
   const CsvTable table = methods_table({run_with_ends(folder, {row("field", 0, 1, 5.0)})});
-  EXPECT_EQ(table.text(0, "mean_tre_mm"), "nan");
+  EXPECT_EQ(table.text(0, "mean_error_mm"), "nan");
 }
 
 TEST(MethodComparison, OfASummaryThatLacksAFactIsAFileError) {
@@ -842,7 +957,9 @@ TEST(MethodComparison, PairsAreThoseOfTheSummary) {
   EXPECT_EQ(table.number(0, "successes_raycast"), 2.0);
   EXPECT_EQ(table.number(0, "mean_distance_mm"), 0.25);
   EXPECT_EQ(table.text(0, "claim"), "not claimed: fewer than 10 patients");
-  EXPECT_NEAR(table.number(0, "tre_difference_mm"), 0.1, 1e-12);
+  EXPECT_EQ(table.text(0, "p"), "fewer than 10 patients");
+  EXPECT_EQ(table.text(0, "mcnemar_p"), "fewer than 10 pairs");
+  EXPECT_NEAR(table.number(0, "error_difference_mm"), 0.1, 1e-12);
   run.summary["field_against_raycast"] = nullptr;
   EXPECT_EQ(pairs_table({run}).row_count(), 0u);
 }

@@ -16,8 +16,7 @@ PatientOutcomes patient(const std::string& name, double fails_from_mm) {
   outcomes.patient = name;
   for (int i = 0; i < 20; ++i) {
     const double initial_mm = 0.5 * i + 0.1;
-    outcomes.by_tre.push_back({initial_mm, initial_mm < fails_from_mm ? 0.3 : 8.0});
-    outcomes.by_mrpd.push_back({initial_mm, 0.2});
+    outcomes.outcomes.push_back({initial_mm, initial_mm < fails_from_mm ? 0.3 : 8.0});
     outcomes.seconds.push_back(0.1);
   }
   return outcomes;
@@ -41,7 +40,7 @@ TEST(PopulationStatistics, TakesPatientsFromNamesOfCases) {
 TEST(PopulationStatistics, OfHandMadePatients) {
   const PatientOutcomes good = patient("a-001", 100.0);
   const PatientOutcomes half = patient("a-002", 4.0);
-  const PopulationSuccess success = population_success({&good, &half}, CountedEnd::Tre, kCounting);
+  const PopulationSuccess success = population_success({&good, &half}, kCounting);
   EXPECT_EQ(success.starts, 40);
   EXPECT_EQ(success.successes, 28);
   EXPECT_DOUBLE_EQ(success.rate.value, 0.7);
@@ -58,8 +57,6 @@ TEST(PopulationStatistics, OfHandMadePatients) {
   // Student's with one degree of freedom: 0.7 +- 12.706 * 0.3.
   EXPECT_NEAR(success.rate.student.high, 0.7 + 12.706 * 0.3, 1e-3);
   EXPECT_EQ(success.capture_lower_bounds, 1);
-  const PopulationSuccess by_mrpd = population_success({&good, &half}, CountedEnd::Mrpd, kCounting);
-  EXPECT_EQ(by_mrpd.successes, 40);
 }
 
 TEST(PopulationStatistics, IntervalsOverPatientsAreWiderThanOverStarts) {
@@ -70,7 +67,7 @@ TEST(PopulationStatistics, IntervalsOverPatientsAreWiderThanOverStarts) {
   for (int i = 0; i < 10; ++i)
     patients.push_back(patient("a-" + std::to_string(i), i % 2 == 0 ? 100.0 : 0.0));
   for (const PatientOutcomes& one : patients) all.push_back(&one);
-  const PopulationSuccess success = population_success(all, CountedEnd::Tre, kCounting);
+  const PopulationSuccess success = population_success(all, kCounting);
   EXPECT_GT(success.rate.bootstrap.high - success.rate.bootstrap.low, 0.4);
   EXPECT_LT(wilson_interval(100, 200).high - wilson_interval(100, 200).low, 0.15);
 }

@@ -47,6 +47,7 @@ TEST(RegistrationErrors, OfAShiftAcrossTheBeamAreItsLengthAndItsMagnification) {
   // The line from the source through (3, 4, 0) passes the origin at 600 sin(atan(5 / 600)).
   EXPECT_NEAR(errors.mrpd_mm, 600 * 5 / std::hypot(600.0, 5.0), kRoundingMm);
   EXPECT_EQ(errors.rotation_deg, 0.0);
+  EXPECT_NEAR(errors.depth_mm, 0.0, kRoundingMm);
 }
 
 TEST(RegistrationErrors, OfAShiftAlongTheBeamVanishInTheImage) {
@@ -55,6 +56,16 @@ TEST(RegistrationErrors, OfAShiftAlongTheBeamVanishInTheImage) {
   EXPECT_NEAR(errors.projection_detector_mm, 0.0, kRoundingMm);
   EXPECT_NEAR(errors.projection_isocenter_mm, 0.0, kRoundingMm);
   EXPECT_NEAR(errors.mrpd_mm, 0.0, kRoundingMm);
+  EXPECT_NEAR(errors.depth_mm, 7.0, kRoundingMm);
+  EXPECT_NEAR(errors_of_origin(moved_by(0, 0, -7), one_camera()).depth_mm, 7.0, kRoundingMm);
+}
+
+// The beam that counts is that to the target's centre: here (450, 0, 0), 750 mm from the source.
+TEST(RegistrationErrors, OfDepthAreAlongTheBeamToTheTarget) {
+  const std::vector<Vector3d> points = {{450, 10, 0}, {450, -10, 0}};
+  const RegistrationErrors errors = registration_errors(
+      moved_by(5, 0, 10), RigidTransform::Identity(), points, Vector3d::Zero(), one_camera());
+  EXPECT_NEAR(errors.depth_mm, 5 * 0.6 + 10 * 0.8, kRoundingMm);
 }
 
 TEST(RegistrationErrors, AreMeansOverCamerasAndPoints) {
@@ -62,6 +73,7 @@ TEST(RegistrationErrors, AreMeansOverCamerasAndPoints) {
   rig.cameras.push_back(camera_along_x());
   // Across the first camera's beam, along the second's.
   EXPECT_NEAR(errors_of_origin(moved_by(6, 0, 0), rig).projection_isocenter_mm, 3.0, kRoundingMm);
+  EXPECT_TRUE(std::isnan(errors_of_origin(moved_by(6, 0, 0), rig).depth_mm));
   // Points of depths 600 and 1200 mm, moved 6 mm: 10 mm and 5 mm on the detector.
   const std::vector<Vector3d> points = {{0, 0, 0}, {0, 0, 600}};
   const RegistrationErrors errors = registration_errors(

@@ -94,10 +94,12 @@ TEST(CaseTable, HasARowPerCaseAndOneOverAll) {
     return json{{"starts", starts},
                 {"successes", successes},
                 {"rate", static_cast<double>(successes) / starts},
-                {"tre_of_successes_mm", {{"mean", mean}, {"sd", 0.25}}},
+                {"error", "TRE"},
+                {"error_of_successes_mm", {{"mean", mean}, {"sd", 0.25}}},
+                {"error_of_all_mm", {{"median", 0.5}, {"p95", "inf"}}},
                 {"tre_of_all_mm", {{"median", 0.5}, {"p95", "inf"}}},
+                {"depth_of_all_mm", {{"median", nullptr}, {"p95", nullptr}}},
                 {"gross_failures", {{"successes", starts - successes}}},
-                {"mrpd_success", {{"successes", successes}}},
                 {"capture_range", nullptr}};
   };
   json renderer = part(6, 2, 0.5);
@@ -109,8 +111,10 @@ TEST(CaseTable, HasARowPerCaseAndOneOverAll) {
   const CsvTable table = case_table(json::array({renderer}));
   ASSERT_EQ(table.row_count(), 3u);
   EXPECT_EQ(table.text(0, "case"), "head");
-  EXPECT_EQ(table.text(0, "mean_tre_of_successes_mm"), "0.5");
-  EXPECT_EQ(table.text(1, "mean_tre_of_successes_mm"), "nan");
+  EXPECT_EQ(table.text(0, "mean_error_of_successes_mm"), "0.5");
+  EXPECT_EQ(table.text(1, "mean_error_of_successes_mm"), "nan");
+  EXPECT_EQ(table.text(0, "median_depth_of_all_mm"), "nan");
+  EXPECT_EQ(table.text(1, "p95_error_of_all_mm"), "inf");
   EXPECT_EQ(table.text(1, "p95_tre_of_all_mm"), "inf");
   EXPECT_EQ(table.text(2, "case"), "all");
   EXPECT_EQ(table.text(2, "successes"), "2");

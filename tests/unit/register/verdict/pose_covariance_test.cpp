@@ -162,6 +162,33 @@ TEST(PredictedTre, IsThatOfDrawnPoses) {
   EXPECT_NEAR(static_cast<double>(below) / kDraws, 0.95, 0.01);
 }
 
+TEST(DepthAlongTheBeam, IsThatOfDrawnPoses) {
+  std::mt19937_64 random(11);
+  PoseVector sizes;
+  sizes << 0.004, 0.001, 0.002, 0.05, 0.4, 3.0;
+  const PoseMatrix covariance = sizes.cwiseAbs2().asDiagonal();
+  const PoseFrame frame = PoseFrame::about(RigidTransform::Identity(), {5, 0, 0});
+  const Eigen::Vector3d point(30, -20, 10);
+  const Eigen::Vector3d source(0, 200, -600);
+  const double predicted_mm = depth_95_mm(covariance, frame, point, source);
+  constexpr int kDraws = 4000;
+  int within = 0;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    const PoseVector error = drawn(random).cwiseProduct(sizes);
+    const RigidTransform pose =
+        pose_from_parameters(frame, {Eigen::Vector3d(error.head<3>()), error.tail<3>()});
+    if (std::abs((pose * point - point).dot((point - source).normalized())) <= predicted_mm)
+      ++within;
+  }
+  EXPECT_NEAR(static_cast<double>(within) / kDraws, 0.95, 0.01);
+  // Across the beam nothing counts.
+  PoseMatrix across = PoseMatrix::Zero();
+  across(3, 3) = 100.0;
+  EXPECT_EQ(depth_95_mm(across, PoseFrame(), {0, 0, 7}, {0, 0, -600}), 0.0);
+  EXPECT_TRUE(std::isnan(
+      depth_95_mm(PoseMatrix::Constant(std::nan("")), PoseFrame(), {1, 2, 3}, {0, 0, -600})));
+}
+
 TEST(Calibration, WidensWhatThePoseDoesNotExplain) {
   for (const char* similarity : {"rg", "gc", "mi"}) {
     CovarianceInflation last = {0.0, 0.0};

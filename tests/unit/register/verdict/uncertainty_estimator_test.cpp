@@ -194,6 +194,9 @@ TEST(UncertaintyEstimator, ForetellsHowLittleOneViewShowsOfDepth) {
                                   &camera.row_direction})
     *vector = turn * *vector;
   view.xray = render_image(*view.renderer, small.gold_room_from_ct, View::whole_detector(camera));
+  const Eigen::Vector3d target_ct_mm = small.problem->center_ct_mm + Eigen::Vector3d(5, -3, 2);
+  small.problem->target_points_ct = {target_ct_mm - Eigen::Vector3d::UnitX(),
+                                     target_ct_mm + Eigen::Vector3d::UnitX()};
   const Eigen::Vector3d beam = camera.column_direction.cross(camera.row_direction).normalized();
   const Image2d clean = view.xray;
   const PoseFrame frame = PoseFrame::about(small.gold_room_from_ct, small.problem->center_ct_mm);
@@ -209,8 +212,15 @@ TEST(UncertaintyEstimator, ForetellsHowLittleOneViewShowsOfDepth) {
     const UncertaintyReport report =
         UncertaintyEstimator(problem, squares(), {}).report(result, std::vector<ViewValue>{{1, 1}});
     ASSERT_TRUE(std::isfinite(report.covariance_deg_mm[0]));
-    const Eigen::Matrix3d covariance =
-        from_deg_mm(report.covariance_deg_mm).bottomRightCorner<3, 3>() / report.inflation;
+    const PoseMatrix sandwich = from_deg_mm(report.covariance_deg_mm) / report.inflation;
+    EXPECT_NEAR(report.depth_95_mm /
+                    depth_95_mm(report.tre_inflation * sandwich,
+                                PoseFrame::about(result.room_from_ct, problem->center_ct_mm),
+                                target_ct_mm,
+                                camera.source_point),
+                1.0,
+                1e-6);
+    const Eigen::Matrix3d covariance = sandwich.bottomRightCorner<3, 3>();
     const Eigen::Vector3d error = parameters_from_pose(frame, result.room_from_ct).translation_mm;
     depth_variance += std::pow(beam.dot(error), 2) / kRepeats;
     predicted_depth_variance += beam.dot(covariance * beam) / kRepeats;
@@ -305,6 +315,7 @@ TEST(UncertaintyEstimator, CalibratesTresByThemselves) {
   ASSERT_GT(tre.rms_mm, 0.0);
   EXPECT_NEAR(report.tre_rms_mm, tre.rms_mm, 1e-9 * tre.rms_mm);
   EXPECT_NEAR(report.tre_95_mm, tre.upper_95_mm, 1e-9 * tre.upper_95_mm);
+  EXPECT_TRUE(std::isnan(report.depth_95_mm)) << "two views show depth";
 }
 
 TEST(UncertaintyEstimator, SaysNothingWhereNoViewCanBeJudged) {

@@ -9,6 +9,7 @@
 #include <memory>
 #include <utility>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "base/hash_random.h"
@@ -75,6 +76,25 @@ TEST(Judgement, WithoutAPredictedTreRejectsNothing) {
   EXPECT_EQ(verdict_of(record), Verdict::Found);
   record.uncertainty.confidence = 0.0;  // there is no end
   EXPECT_EQ(verdict_of(record), Verdict::NotFound);
+}
+
+TEST(Judgement, OfOneViewSaysWhatIsNotKnown) {
+  const auto record_of = [](double confidence, double depth_95_mm, std::size_t views) {
+    RegistrationRecord record = record_with(confidence, std::vector<ViewValue>(views, {0.9, 0.9}));
+    record.uncertainty.depth_95_mm = depth_95_mm;
+    return record;
+  };
+  const auto reason = [&](double depth_95_mm) {
+    return judgement_of(record_of(0.9968, depth_95_mm, 1)).reason;
+  };
+  EXPECT_THAT(reason(24.0), testing::EndsWith("wanted; depth along the beam within 24 mm"));
+  EXPECT_THAT(reason(23.01), testing::EndsWith("depth along the beam within 24 mm"));
+  EXPECT_THAT(reason(9.91), testing::EndsWith("depth along the beam within 10 mm"));
+  EXPECT_THAT(reason(0.01), testing::EndsWith("depth along the beam within 0.1 mm"));
+  EXPECT_THAT(reason(std::nan("")), testing::EndsWith("depth along the beam not known"));
+  EXPECT_EQ(verdict_of(record_of(0.9968, 24.0, 1)), Verdict::Found);
+  for (const RegistrationRecord& record : {record_of(0.9968, 24.0, 2), record_of(0.01, 24.0, 1)})
+    EXPECT_THAT(judgement_of(record).reason, testing::Not(testing::HasSubstr("along the beam")));
 }
 
 TEST(Judgement, WhatWasNotSearchedIsNotFoundWhateverItsValue) {
