@@ -43,11 +43,13 @@ double step_mm(const PoseVector& direction) {
 
 }  // namespace
 
-PoseMatrix bent_curvature(const PoseMatrix& curvature, const PoseMatrix& basis) {
+PoseMatrix bent_curvature(const PoseMatrix& curvature,
+                          const PoseMatrix& basis,
+                          double least_share) {
   const Eigen::SelfAdjointEigenSolver<PoseMatrix> solver(basis.transpose() * curvature * basis);
   const double largest = solver.eigenvalues()[5];
   if (!(largest > 0.0)) return PoseMatrix::Zero();
-  const PoseVector kept = solver.eigenvalues().cwiseMax(kLeastRelativeCurvature * largest);
+  const PoseVector kept = solver.eigenvalues().cwiseMax(least_share * largest);
   const PoseMatrix bent =
       solver.eigenvectors() * kept.asDiagonal() * solver.eigenvectors().transpose();
   const PoseMatrix back = basis.inverse();

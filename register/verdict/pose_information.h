@@ -39,11 +39,17 @@ inline constexpr double kLongestInformationMoveMm = 8.0;
 inline constexpr double kLargestInformationTurnRad = 0.05;
 
 /// Curvatures below this share of the largest, per squared projected motion, are raised to it:
-/// differences cannot tell them from zero or from an upward bend.
+/// differences cannot tell them from zero or from an upward bend. So flat an end is one to doubt.
 inline constexpr double kLeastRelativeCurvature = 1e-2;
 
-/// The matrix with its eigenvalues in `basis` no less than kLeastRelativeCurvature of the largest;
-/// zero where that is not positive. \test BentCurvature.KeepsDirectionsThatAreKnown
-PoseMatrix bent_curvature(const PoseMatrix& curvature, const PoseMatrix& basis);
+/// The same for how far a right pose may be off: right poses of clean X-rays bend by 0.05 to 0.2 in
+/// every direction. A smaller bend is what stressed X-rays hide of it, and its square divides.
+inline constexpr double kLeastCurvatureOfBounds = 0.05;
+
+/// The matrix with its eigenvalues in `basis` no less than `least_share` of the largest; zero where
+/// that is not positive. \test BentCurvature.KeepsDirectionsThatAreKnown
+PoseMatrix bent_curvature(const PoseMatrix& curvature,
+                          const PoseMatrix& basis,
+                          double least_share = kLeastRelativeCurvature);
 
 }  // namespace af::registration
