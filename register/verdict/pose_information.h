@@ -42,8 +42,9 @@ inline constexpr double kLargestInformationTurnRad = 0.05;
 /// differences cannot tell them from zero or from an upward bend. So flat an end is one to doubt.
 inline constexpr double kLeastRelativeCurvature = 1e-2;
 
-/// The same for how far a right pose may be off: right poses of clean X-rays bend by 0.05 to 0.2 in
-/// every direction. A smaller bend is what stressed X-rays hide of it, and its square divides.
+/// The same for how far a right pose may be off that several views see: where they are clean it
+/// bends by 0.05 to 0.2 in every direction. A smaller bend is what stress hides of it, and its
+/// square divides. One view may really be that flat along its beam.
 inline constexpr double kLeastCurvatureOfBounds = 0.05;
 
 /// The matrix with its eigenvalues in `basis` no less than `least_share` of the largest; zero where
