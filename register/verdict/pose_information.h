@@ -39,18 +39,20 @@ inline constexpr double kLongestInformationMoveMm = 8.0;
 inline constexpr double kLargestInformationTurnRad = 0.05;
 
 /// Curvatures below this share of the largest, per squared projected motion, are raised to it:
-/// differences cannot tell them from zero or from an upward bend. So flat an end is one to doubt.
+/// differences cannot tell them from zero or from an upward bend.
 inline constexpr double kLeastRelativeCurvature = 1e-2;
 
-/// The same for how far a right pose may be off that several views see: where they are clean it
-/// bends by 0.05 to 0.2 in every direction. A smaller bend is what stress hides of it, and its
-/// square divides. One view may really be that flat along its beam.
-inline constexpr double kLeastCurvatureOfBounds = 0.05;
+/// What DRRs do not explain changes the gradient by its scatter over about this much projected
+/// motion: a smaller curvature drowns in that. Right poses of clean X-rays bend by
+/// kDrownedCurvature of the largest or more in all directions, so no more than that is raised.
+inline constexpr double kScatterLengthMm = 1.0;
+inline constexpr double kDrownedCurvature = 0.05;
 
-/// The matrix with its eigenvalues in `basis` no less than `least_share` of the largest; zero where
-/// that is not positive. \test BentCurvature.KeepsDirectionsThatAreKnown
+/// The matrix with its eigenvalues in `basis` no less than kLeastRelativeCurvature of the largest,
+/// nor than what drowns in `scatter`; zero where the largest is not positive.
+/// \test BentCurvature.KeepsDirectionsThatAreKnown \test BentCurvature.RaisesWhatDrownsInScatter
 PoseMatrix bent_curvature(const PoseMatrix& curvature,
                           const PoseMatrix& basis,
-                          double least_share = kLeastRelativeCurvature);
+                          const PoseMatrix& scatter = PoseMatrix::Zero());
 
 }  // namespace af::registration

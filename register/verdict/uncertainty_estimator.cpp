@@ -107,9 +107,9 @@ double UncertaintyEstimator::add_covariance(const RegistrationResult& result,
   auto information = information_at(ends_[stage].objective, frame, *basis, kTiles);
   if (!information.has_value()) return UncertaintyReport::kNone;
   const auto flat_sandwich = sandwich_covariance(*information);
+  // Along its beam one view may really be that flat.
   if (views_.size() > 1)
-    information->curvature =
-        bent_curvature(information->curvature, *basis, kLeastCurvatureOfBounds);
+    information->curvature = bent_curvature(information->curvature, *basis, information->scatter);
   const auto sandwich = sandwich_covariance(*information);
   if (!flat_sandwich.has_value() || !sandwich.has_value()) return UncertaintyReport::kNone;
   const CovarianceInflation inflation = covariance_inflation(similarities_[stage], view_values);

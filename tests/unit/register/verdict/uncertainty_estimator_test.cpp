@@ -126,11 +126,6 @@ TEST(BentCurvature, KeepsDirectionsThatAreKnown) {
   const PoseMatrix bent = bent_curvature(sizes.asDiagonal(), PoseMatrix::Identity());
   sizes[5] = kLeastRelativeCurvature * 100;
   EXPECT_TRUE(bent.isApprox(PoseMatrix(sizes.asDiagonal()), 1e-12));
-  // Raised twice is raised by the larger share.
-  PoseVector raised = sizes;
-  raised.tail<3>().setConstant(15);
-  EXPECT_TRUE(bent_curvature(bent, PoseMatrix::Identity(), 0.15)
-                  .isApprox(PoseMatrix(raised.asDiagonal()), 1e-12));
   // The same matrix in other parameters.
   PoseMatrix basis = PoseMatrix::Identity();
   basis(0, 3) = 2.0;
@@ -140,6 +135,17 @@ TEST(BentCurvature, KeepsDirectionsThatAreKnown) {
   const PoseMatrix skew = bent_curvature(back.transpose() * sizes.asDiagonal() * back, basis);
   EXPECT_TRUE(skew.isApprox(back.transpose() * bent * back, 1e-12));
   EXPECT_TRUE(bent_curvature(-PoseMatrix::Identity(), PoseMatrix::Identity()).isZero());
+}
+
+TEST(BentCurvature, RaisesWhatDrownsInScatter) {
+  PoseVector sizes;
+  sizes << 100, 50, 20, 3, 2.5, -3;
+  PoseVector gradients;  // standard deviations, per mm
+  gradients << 60, 60, 60, 2, 4, 60;
+  const PoseMatrix scatter = gradients.cwiseAbs2().asDiagonal();
+  const PoseMatrix bent = bent_curvature(sizes.asDiagonal(), PoseMatrix::Identity(), scatter);
+  sizes.tail<3>() << 3, 4 / kScatterLengthMm, 100 * kDrownedCurvature;
+  EXPECT_TRUE(bent.isApprox(PoseMatrix(sizes.asDiagonal()), 1e-12)) << bent;
 }
 
 /// Sums of squares from start to end, at one resolution.
