@@ -9,6 +9,7 @@
 #include "base/joined.h"
 #include "base/number_text.h"
 #include "ct/ct_facts.h"
+#include "drr/field_level.h"
 #include "drr/opened_field.h"
 #include "files/sha256.h"
 #include "geometry/camera_distance.h"
@@ -286,6 +287,7 @@ void use_fields(const StudyCase& study_case,
     const std::string name = "field " + view.view.camera.name;
     if (bone) loaded.inputs["bone " + name] = bone->info().payload_sha256;
     view.renderer = renderers.levels.front();
+    view.sample_spacing_mm = node_spacing_mm(*field->opened.coverage().planes.front());
     for (std::size_t level = 0; level < renderers.blur_sigma_mm.size(); ++level)
       view.coarse_levels.push_back({renderers.levels[level + 1], renderers.blur_sigma_mm[level]});
     loaded.input_notes[name] = limit_to_rays(*field, problem, communicator, view) +
@@ -387,6 +389,7 @@ LoadedCase load_case(const Study& study,
     const auto levels = coarse_ray_casts(volumes, options, communicator);
     for (RegistrationView& view : problem->views) {
       view.renderer = ray_cast;
+      view.sample_spacing_mm = ct->grid.spacing_mm.mean();
       view.coarse_levels = levels;
     }
   }

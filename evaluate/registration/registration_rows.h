@@ -39,6 +39,7 @@ struct RegistrationRow : registration::RegistrationRow {
   double stated_pose_tre_mm = kMissing;  ///< against gold_room_from_ct when gold is the fiducials'
   RegistrationErrors errors;
   double squared_distance = kMissing;  ///< Mahalanobis, of the error by the covariance
+  double gold_tre_95_mm = 0.0;         ///< of the gold standard itself; 0 where nobody knows
   std::string error;                   ///< message of a registration that threw
   bool has_one_view = false;           ///< of its case
 
@@ -56,6 +57,7 @@ struct RegistrationRow : registration::RegistrationRow {
                                    stated_pose_tre_mm,
                                    errors,
                                    squared_distance,
+                                   gold_tre_95_mm,
                                    error,
                                    has_one_view));
   }

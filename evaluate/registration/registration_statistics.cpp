@@ -221,7 +221,7 @@ json renderer_statistics(std::span<const RegistrationRow> rows,
   for (const json& interval : result["intervals"]) inside += interval["starts"].get<std::int64_t>();
   result["starts_beyond_last_interval"] = static_cast<std::int64_t>(mine.size()) - inside;
   result["over_cases"] = over_patients_json(by_patient, options);
-  if (json uncertainty = uncertainty_statistics(by_patient, options); !uncertainty.is_null())
+  if (json uncertainty = uncertainty_statistics(by_case, options); !uncertainty.is_null())
     result["uncertainty"] = std::move(uncertainty);
   result["cases"] = json::array();
   for (const auto& [name, case_rows] : by_case) {

@@ -6,10 +6,13 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <iterator>
+#include <utility>
 #include <vector>
 
 #include "base/sample_summary.h"
 #include "evaluate/registration/case_intervals.h"
+#include "evaluate/statistics/patient_names.h"
 #include "evaluate/statistics/roc.h"
 #include "files/number_json.h"
 #include "register/verdict/pose_covariance.h"
@@ -29,25 +32,39 @@ struct Region {
   std::function<bool(const RegistrationRow&)> holds;
 };
 
-json coverage_json(const std::map<std::string, RowPointers>& by_patient,
+/// Of the ends with a median error, the lower of two; `ends` is not empty.
+const RegistrationRow& median_end(RowPointers ends) {
+  const auto middle = ends.begin() + (std::ssize(ends) - 1) / 2;
+  std::nth_element(ends.begin(), middle, ends.end(), [](const auto* a, const auto* b) {
+    return a->decisive_mm() < b->decisive_mm();
+  });
+  return **middle;
+}
+
+json coverage_json(const std::map<std::string, RowPointers>& by_case,
                    const StatisticsOptions& options,
                    const Region& region) {
-  std::vector<CaseMean> patients;
+  std::map<std::string, CaseMean> by_patient;
   std::int64_t known = 0;
   std::int64_t held = 0;
-  for (const auto& [name, rows] : by_patient) {
-    CaseMean mean;
-    for (const RegistrationRow* row : rows) {
-      if (!row->is_success(options.success_tre_mm) || !region.is_known(*row)) continue;
-      mean.count += 1.0;
-      mean.sum += region.holds(*row) ? 1.0 : 0.0;
-    }
-    if (!(mean.count > 0.0)) continue;
-    known += std::llround(mean.count);
-    held += std::llround(mean.sum);
-    patients.push_back(mean);
+  for (const auto& [name, rows] : by_case) {
+    RowPointers ends;
+    std::copy_if(rows.begin(), rows.end(), std::back_inserter(ends), [&](const auto* row) {
+      return row->is_success(options.success_tre_mm) && region.is_known(*row);
+    });
+    if (ends.empty()) continue;
+    const bool is_held = region.holds(median_end(std::move(ends)));
+    ++known;
+    held += is_held ? 1 : 0;
+    CaseMean& patient = by_patient[patient_of_case(name)];
+    patient.count += 1.0;
+    patient.sum += is_held ? 1.0 : 0.0;
   }
   json result = proportion_json(held, known);
+  result["cases"] = known;
+  result.erase("starts");
+  std::vector<CaseMean> patients;
+  for (const auto& [name, mean] : by_patient) patients.push_back(mean);
   result["over_cases"] = interval_over_cases(patients, options.seed);
   return result;
 }
@@ -78,19 +95,19 @@ json verdicts_json(const RowPointers& rows, double success_mm) {
     counts[to_string(verdict)] = {{"right", 0}, {"wrong", 0}};
   for (const RegistrationRow* row : rows)
     if (!row->verdict.empty())
-      ++counts[row->verdict][row->is_right(success_mm) ? "right" : "wrong"];
+      ++counts[row->verdict][row->is_success(success_mm) ? "right" : "wrong"];
   return counts;
 }
 
 }  // namespace
 
-json uncertainty_statistics(const std::map<std::string, RowPointers>& by_patient,
+json uncertainty_statistics(const std::map<std::string, RowPointers>& by_case,
                             const StatisticsOptions& options) {
   std::vector<double> successes;
   std::vector<double> failures;
   std::vector<double> squared_distances;
   RowPointers all;
-  for (const auto& [name, rows] : by_patient)
+  for (const auto& [name, rows] : by_case)
     for (const RegistrationRow* row : rows) {
       all.push_back(row);
       const bool is_success = row->is_success(options.success_tre_mm);
@@ -107,9 +124,11 @@ json uncertainty_statistics(const std::map<std::string, RowPointers>& by_patient
       }};
   const Region tre = {
       [](const RegistrationRow& row) { return std::isfinite(row.uncertainty.tre_95_mm); },
-      [](const RegistrationRow& row) { return row.tre_mm <= row.uncertainty.tre_95_mm; }};
-  return {{"pose_region_95", coverage_json(by_patient, options, pose)},
-          {"tre_region_95", coverage_json(by_patient, options, tre)},
+      [](const RegistrationRow& row) {
+        return row.tre_mm <= std::hypot(row.uncertainty.tre_95_mm, row.gold_tre_95_mm);
+      }};
+  return {{"pose_region_95", coverage_json(by_case, options, pose)},
+          {"tre_region_95", coverage_json(by_case, options, tre)},
           {"median_squared_distance", number_json(summarize(squared_distances).median)},
           {"confidence", confidence_json(successes, failures)},
           {"verdicts", verdicts_json(all, options.success_tre_mm)}};

@@ -18,6 +18,7 @@ namespace af::evaluation {
 struct Yardstick {
   PoseFrame gold_frame;
   RigidTransform gold_room_from_ct = RigidTransform::Identity();
+  double gold_tre_95_mm = 0.0;                ///< 95 % quantile of the gold standard's own TRE
   std::optional<RigidTransform> stated_pose;  ///< only beside fiducials
   std::vector<Eigen::Vector3d> points_ct_mm;
   Eigen::Vector3d center_ct_mm = Eigen::Vector3d::Zero();  ///< c_roi

@@ -206,8 +206,8 @@ def confidence_table(renderers):
             rows.append([method_name(renderer["renderer"]), whole(level["confidence"]), percent(level["share_of_successes"]),
                          percent(level["share_of_failures"]), three(found["roc_area"]), rate(stated["tre_region_95"]),
                          rate(stated["pose_region_95"])])
-    return Table(["Method", "#Confidence at least", "#Of right ends", "#Of wrong ends", "#ROC area", "#TRE below its stated 95 %",
-                  "#Pose inside its stated 95 % region"], rows, "What registrations say of their own ends") if rows else None
+    return Table(["Method", "#Confidence at least", "#Of right ends", "#Of wrong ends", "#ROC area", "#Cases with a TRE below its stated 95 %",
+                  "#Cases with the pose inside its stated 95 % region"], rows, "What registrations say of their own ends") if rows else None
 
 
 def verdict_table(renderers):

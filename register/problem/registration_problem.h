@@ -29,6 +29,9 @@ struct RegistrationView {
   /// pixels or more if it leaves three quarters of them.
   Image2d mask_without_markers;
   std::shared_ptr<const DrrRenderer> renderer;
+  /// Distance at the isocentre, mm, of what the renderer interpolates between: a field's (s,t)
+  /// nodes, the CT's voxels. Every level doubles it. 0: nothing is interpolated.
+  double sample_spacing_mm = 0.0;
   std::vector<RendererLevel> coarse_levels;  ///< 1, 2, ... as far as stages and verdict need them
   /// Motion box of the renderer's field; none for ray casting, and none where the field was made
   /// for another camera: then rays alone decide.

@@ -44,6 +44,9 @@ constexpr std::array kInflation = {
     InflationRow{"", Evidence::Views, {2.50, 8.00}, {2.50, 8.00}},
 };
 
+/// Of the samples' spacing; see interpolation_shift_mm() and docs/uncertainty.md.
+constexpr double kShiftPerSpacing = 0.02;
+
 /// The coefficients of a logistic regression on two features.
 struct Confidence {
   double at_once;
@@ -95,6 +98,10 @@ CovarianceInflation covariance_inflation(const std::string& similarity,
         return similarity == candidate.similarity && evidence == candidate.evidence;
       });
   return {factor_of(row->pose, share), factor_of(row->tre, share)};
+}
+
+double interpolation_shift_mm(double spacing_mm) {
+  return kShiftPerSpacing * spacing_mm;
 }
 
 double success_confidence(const ConfidenceFeatures& features) {

@@ -24,6 +24,11 @@ struct CovarianceInflation {
 CovarianceInflation covariance_inflation(const std::string& similarity,
                                          std::span<const ViewValue> view_values);
 
+/// Standard deviation (mm at the isocentre) of the shift of a view's image that comes from DRRs
+/// being interpolated from samples `spacing_mm` apart there: the same from every start, and not
+/// among the residuals of the pose that it moved. \test Calibration.CoarserSamplesShiftImagesMore
+double interpolation_shift_mm(double spacing_mm);
+
 /// What tells a success from a failure.
 struct ConfidenceFeatures {
   std::span<const ViewValue> view_values;  ///< with backgrounds

@@ -44,20 +44,17 @@ std::optional<PoseMatrix> sandwich_covariance(const PoseInformation& information
   return 0.5 * (covariance + covariance.transpose());
 }
 
-PoseMatrix calibration_covariance(const PoseInformation& information,
-                                  std::span<const View> views,
-                                  const Eigen::Vector3d& isocenter_point,
-                                  double shift_px) {
+PoseMatrix shift_covariance(const PoseInformation& information,
+                            std::span<const View> views,
+                            std::span<const Eigen::Vector2d> shifts_mm) {
   const Eigen::LDLT<PoseMatrix> curvature(information.curvature);
   PoseMatrix covariance = PoseMatrix::Zero();
   for (std::size_t i = 0; i < views.size(); ++i) {
     const CameraGeometry& camera = views[i].camera;
-    const double mm_per_detector_mm =
-        camera.depth_mm(isocenter_point) / camera.source_detector_distance_mm();
     for (const int axis : {0, 1}) {
       PoseVector shift = PoseVector::Zero();
-      shift.tail<3>() = (axis == 0 ? camera.column_direction : camera.row_direction) *
-                        (shift_px * camera.pixel_spacing_mm[axis] * mm_per_detector_mm);
+      shift.tail<3>() =
+          (axis == 0 ? camera.column_direction : camera.row_direction) * shifts_mm[i][axis];
       const PoseVector error = curvature.solve(information.view_curvatures[i] * shift);
       covariance += error * error.transpose();
     }

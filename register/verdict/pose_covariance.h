@@ -20,15 +20,14 @@ namespace af::registration {
 /// \test PoseCovariance.PredictsTheSpreadOfRepeatedFits
 std::optional<PoseMatrix> sandwich_covariance(const PoseInformation& information);
 
-/// What errors of the cameras' calibration add: each view's image shifted by independent normal
-/// errors of `shift_px` along its columns and its rows. A shift moves a view's optimum as a
-/// translation of the CT along the detector would, and the views' curvatures weigh the views:
-/// C^-1 (sum_v C_v T_v T_v' C_v) C^-1. `isocenter_point`: where a pixel's width is measured.
+/// What errors add that shift the views' images, by independent normal errors of `shifts_mm[view]`
+/// (standard deviations along columns and rows, mm at the isocentre). A shift moves a view's
+/// optimum as a translation of the CT along the detector would, and the views' curvatures weigh the
+/// views: C^-1 (sum_v C_v T_v T_v' C_v) C^-1.
 /// \test PoseCovariance.OfAShiftedViewIsTheTranslationThatMendsIt
-PoseMatrix calibration_covariance(const PoseInformation& information,
-                                  std::span<const View> views,
-                                  const Eigen::Vector3d& isocenter_point,
-                                  double shift_px);
+PoseMatrix shift_covariance(const PoseInformation& information,
+                            std::span<const View> views,
+                            std::span<const Eigen::Vector2d> shifts_mm);
 
 /// TRE that a covariance predicts.
 struct PredictedTre {

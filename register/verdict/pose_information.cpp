@@ -43,13 +43,19 @@ double step_mm(const PoseVector& direction) {
 
 }  // namespace
 
-PoseMatrix bent_curvature(const PoseMatrix& curvature, const PoseMatrix& basis) {
+PoseMatrix bent_curvature(const PoseMatrix& curvature,
+                          const PoseMatrix& basis,
+                          const PoseMatrix& scatter) {
   const Eigen::SelfAdjointEigenSolver<PoseMatrix> solver(basis.transpose() * curvature * basis);
   const double largest = solver.eigenvalues()[5];
   if (!(largest > 0.0)) return PoseMatrix::Zero();
-  const PoseVector kept = solver.eigenvalues().cwiseMax(kLeastRelativeCurvature * largest);
-  const PoseMatrix bent =
-      solver.eigenvectors() * kept.asDiagonal() * solver.eigenvectors().transpose();
+  const PoseMatrix& directions = solver.eigenvectors();
+  const PoseMatrix along = basis * directions;
+  const PoseVector drowned =
+      (along.transpose() * scatter * along).diagonal().cwiseSqrt() / kScatterLengthMm;
+  const PoseVector kept = solver.eigenvalues().cwiseMax(
+      drowned.cwiseMin(kDrownedCurvature * largest).cwiseMax(kLeastRelativeCurvature * largest));
+  const PoseMatrix bent = directions * kept.asDiagonal() * directions.transpose();
   const PoseMatrix back = basis.inverse();
   return back.transpose() * bent * back;
 }

@@ -42,8 +42,17 @@ inline constexpr double kLargestInformationTurnRad = 0.05;
 /// differences cannot tell them from zero or from an upward bend.
 inline constexpr double kLeastRelativeCurvature = 1e-2;
 
-/// The matrix with its eigenvalues in `basis` no less than kLeastRelativeCurvature of the largest;
-/// zero where that is not positive. \test BentCurvature.KeepsDirectionsThatAreKnown
-PoseMatrix bent_curvature(const PoseMatrix& curvature, const PoseMatrix& basis);
+/// What DRRs do not explain changes the gradient by its scatter over about this much projected
+/// motion: a smaller curvature drowns in that. Right poses of clean X-rays bend by
+/// kDrownedCurvature of the largest or more in all directions, so no more than that is raised.
+inline constexpr double kScatterLengthMm = 1.0;
+inline constexpr double kDrownedCurvature = 0.05;
+
+/// The matrix with its eigenvalues in `basis` no less than kLeastRelativeCurvature of the largest,
+/// nor than what drowns in `scatter`; zero where the largest is not positive.
+/// \test BentCurvature.KeepsDirectionsThatAreKnown \test BentCurvature.RaisesWhatDrownsInScatter
+PoseMatrix bent_curvature(const PoseMatrix& curvature,
+                          const PoseMatrix& basis,
+                          const PoseMatrix& scatter = PoseMatrix::Zero());
 
 }  // namespace af::registration

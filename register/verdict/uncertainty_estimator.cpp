@@ -73,6 +73,21 @@ UncertaintyEstimator::UncertaintyEstimator(std::shared_ptr<const RegistrationPro
   }
 }
 
+std::vector<Eigen::Vector2d> UncertaintyEstimator::shifts_mm(int level) const {
+  std::vector<Eigen::Vector2d> shifts;
+  for (const RegistrationView& view : problem_->views) {
+    const CameraGeometry& camera = view.view.camera;
+    const double mm_per_detector_mm =
+        camera.depth_mm(problem_->isocenter_point) / camera.source_detector_distance_mm();
+    const Eigen::Array2d by_calibration =
+        options_.calibration_error_px * mm_per_detector_mm * camera.pixel_spacing_mm.array();
+    const double by_interpolation =
+        interpolation_shift_mm(std::ldexp(view.sample_spacing_mm, level));
+    shifts.emplace_back((by_calibration.square() + std::pow(by_interpolation, 2)).sqrt());
+  }
+  return shifts;
+}
+
 double UncertaintyEstimator::add_covariance(const RegistrationResult& result,
                                             std::span<const ViewValue> view_values,
                                             UncertaintyReport& report) {
@@ -91,19 +106,23 @@ double UncertaintyEstimator::add_covariance(const RegistrationResult& result,
   };
   if (!std::ranges::all_of(view_values, is_of_the_stage)) return UncertaintyReport::kNone;
   if (!ends_[stage].narrow_to(*problem_, result.room_from_ct)) return UncertaintyReport::kNone;
-  const auto information = information_at(ends_[stage].objective, frame, *basis, kTiles);
+  auto information = information_at(ends_[stage].objective, frame, *basis, kTiles);
   if (!information.has_value()) return UncertaintyReport::kNone;
+  const auto flat_sandwich = sandwich_covariance(*information);
+  // Along its beam one view may really be that flat.
+  if (views_.size() > 1)
+    information->curvature = bent_curvature(information->curvature, *basis, information->scatter);
   const auto sandwich = sandwich_covariance(*information);
-  if (!sandwich.has_value()) return UncertaintyReport::kNone;
+  if (!flat_sandwich.has_value() || !sandwich.has_value()) return UncertaintyReport::kNone;
   const CovarianceInflation inflation = covariance_inflation(similarities_[stage], view_values);
   if (!std::isfinite(inflation.pose)) return UncertaintyReport::kNone;
   report.inflation = inflation.pose;
   report.tre_inflation = inflation.tre;
-  const PoseMatrix by_cameras = calibration_covariance(
-      *information, views_, problem_->isocenter_point, options_.calibration_error_px);
-  report.covariance_deg_mm = in_deg_mm(inflation.pose * *sandwich + by_cameras);
+  const PoseMatrix by_shifts =
+      shift_covariance(*information, views_, shifts_mm(ends_[stage].options.level));
+  report.covariance_deg_mm = in_deg_mm(inflation.pose * *sandwich + by_shifts);
   if (problem_->target_points_ct.empty()) return UncertaintyReport::kNone;
-  const PoseMatrix of_target = inflation.tre * *sandwich + by_cameras;
+  const PoseMatrix of_target = inflation.tre * *sandwich + by_shifts;
   const std::vector<Eigen::Vector3d>& target_ct = problem_->target_points_ct;
   const PredictedTre tre = predicted_tre(of_target, frame, target_ct);
   report.tre_rms_mm = tre.rms_mm;
@@ -111,7 +130,7 @@ double UncertaintyEstimator::add_covariance(const RegistrationResult& result,
   if (views_.size() == 1)
     report.depth_95_mm =
         depth_95_mm(of_target, frame, mean_point(target_ct), views_.front().camera.source_point);
-  return predicted_tre(*sandwich, frame, target_ct).rms_mm;
+  return predicted_tre(*flat_sandwich, frame, target_ct).rms_mm;
 }
 
 UncertaintyReport UncertaintyEstimator::report(const RegistrationResult& result,

@@ -23,11 +23,12 @@ struct UncertaintyOptions {
 };
 
 /// Says how far the end of a registration may be from the truth (docs/uncertainty.md): the sandwich
-/// covariance of the stage that it ended with, what the cameras' calibration adds, widened by a
-/// factor calibrated on measured registrations, the resulting TRE, and the confidence that it
-/// succeeded. Where the stage's measure has no derivative (tncc, gd, pi, entropy, go), rg stands
-/// for it, within silhouettes gc. For one thread at a time. \test
-/// UncertaintyEstimator.ForetellsTheSpreadOfNoisyXrays
+/// covariance of the stage that it ended with, widened by a factor calibrated on measured
+/// registrations, what the cameras' calibration and the DRRs' interpolation add, the resulting TRE,
+/// and the confidence that it succeeded. Where the stage's measure has no derivative (tncc, gd, pi,
+/// entropy, go), rg stands for it, within silhouettes gc. For one thread at a time. \test
+/// UncertaintyEstimator.ForetellsTheSpreadOfNoisyXrays \test
+/// UncertaintyEstimator.AddsWhatInterpolationShifts
 class UncertaintyEstimator {
  public:
   /// `problem` and `method`: of the registration. Reports have only a confidence when uncertainty
@@ -46,10 +47,14 @@ class UncertaintyEstimator {
                                          std::span<const ViewValue> view_values);
 
  private:
-  /// Returns the rms TRE (mm) that the sandwich alone predicts; NaN where there is none.
+  /// Returns the rms TRE (mm) that the sandwich alone predicts, for the confidence, to which flat
+  /// directions count in full; NaN where there is none.
   double add_covariance(const RegistrationResult& result,
                         std::span<const ViewValue> view_values,
                         UncertaintyReport& report);
+
+  /// Standard deviations of what shifts the views' images, mm at the isocentre, at a level.
+  [[nodiscard]] std::vector<Eigen::Vector2d> shifts_mm(int level) const;
 
   std::shared_ptr<const RegistrationProblem> problem_;
   UncertaintyOptions options_;

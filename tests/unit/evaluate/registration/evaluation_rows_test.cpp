@@ -278,8 +278,11 @@ TEST(RegistrationStatistics, BiasIsTheMeanSignedErrorOfSuccesses) {
   EXPECT_EQ(bias["tz_mm"]["mean"], 0.0);
 }
 
-RegistrationRow sure_row(double tre_mm, double squared_distance, double confidence) {
-  RegistrationRow result = row("field", 0, 4.0, tre_mm);
+RegistrationRow sure_row(double tre_mm,
+                         double squared_distance,
+                         double confidence,
+                         const std::string& case_name) {
+  RegistrationRow result = row("field", 0, 4.0, tre_mm, case_name);
   result.squared_distance = squared_distance;
   result.uncertainty.tre_95_mm = 1.0;
   result.uncertainty.confidence = confidence;
@@ -287,15 +290,15 @@ RegistrationRow sure_row(double tre_mm, double squared_distance, double confiden
 }
 
 TEST(RegistrationStatistics, SayWhetherRegistrationsKnowTheirErrors) {
-  Rows rows = {sure_row(0.5, 3.0, 0.99),
-               sure_row(0.9, 12.0, 0.95),
-               sure_row(1.5, 13.0, 0.6),
-               sure_row(8.0, 900.0, 0.7)};
+  Rows rows = {sure_row(0.5, 3.0, 0.99, "a"),
+                     sure_row(0.9, 12.0, 0.95, "b"),
+                     sure_row(1.5, 13.0, 0.6, "c"),
+                     sure_row(8.0, 900.0, 0.7, "c")};
   rows[0].verdict = "found";
   rows[1].verdict = rows[3].verdict = "doubtful";
   const json found = renderer_statistics(rows, "field", {1})["uncertainty"];
   EXPECT_EQ(found["pose_region_95"]["successes"], 2);
-  EXPECT_EQ(found["pose_region_95"]["starts"], 3);  // the failure is for the confidence to tell
+  EXPECT_EQ(found["pose_region_95"]["cases"], 3);  // the failure is for the confidence to tell
   EXPECT_EQ(found["tre_region_95"]["successes"], 2);
   EXPECT_EQ(found["median_squared_distance"], 12.0);
   const json& confidence = found["confidence"];
@@ -310,6 +313,22 @@ TEST(RegistrationStatistics, SayWhetherRegistrationsKnowTheirErrors) {
                   {"not found", {{"right", 0}, {"wrong", 0}}}}));
   EXPECT_FALSE(
       renderer_statistics(Rows{row("field", 0, 4.0, 0.5)}, "field", {1}).contains("uncertainty"));
+}
+
+// Ten starts of one case are one pair of X-rays; its end with the median error stands for it.
+TEST(RegistrationStatistics, CountCoverageOverCases) {
+  Rows rows(10, sure_row(0.5, 3.0, 0.99, "a-p1"));
+  for (const double tre_mm : {0.2, 1.3, 1.2}) rows.push_back(sure_row(tre_mm, 3.0, 0.99, "b-p1"));
+  json found = renderer_statistics(rows, "field", {1})["uncertainty"];
+  EXPECT_EQ(found["tre_region_95"]["cases"], 2);
+  EXPECT_EQ(found["tre_region_95"]["successes"], 1);
+  EXPECT_FALSE(found["tre_region_95"].contains("starts"));
+  EXPECT_EQ(found["tre_region_95"]["over_cases"]["cases"], 2);
+  EXPECT_EQ(found["pose_region_95"]["successes"], 2);
+  // The gold standard is itself up to 0.7 mm off: 1.2 mm are within 1 mm and that.
+  for (RegistrationRow& of_case : rows) of_case.gold_tre_95_mm = 0.7;
+  found = renderer_statistics(rows, "field", {1})["uncertainty"];
+  EXPECT_EQ(found["tre_region_95"]["successes"], 2);
 }
 
 TEST(RegistrationStatistics, IntervalsOverCasesNeedSeveral) {

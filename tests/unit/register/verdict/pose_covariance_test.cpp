@@ -101,23 +101,22 @@ TEST(PoseCovariance, IsTheInverseCurvatureWhereErrorsAreIndependentAndOfOneSize)
 }
 
 TEST(PoseCovariance, OfAShiftedViewIsTheTranslationThatMendsIt) {
-  // One view, all of the curvature: the shift moves the CT along the detector, scaled to the
-  // isocentre plane (3 mm pixels, 650 of 1000 mm).
+  // One view, all of the curvature: the shift moves the CT along the detector.
   PoseInformation information;
   information.curvature = PoseMatrix::Identity();
   information.view_curvatures = {PoseMatrix::Identity()};
   const View view = View::whole_detector(test::small_camera(false));
+  const Eigen::Vector2d shift_mm(0.5, 0.8);
   const PoseMatrix covariance =
-      calibration_covariance(information, std::vector{view}, Eigen::Vector3d::Zero(), 0.5);
-  const double variance = std::pow(0.5 * 3.0 * 0.65, 2);
+      shift_covariance(information, std::vector{view}, std::vector{shift_mm});
   PoseMatrix expected = PoseMatrix::Zero();
-  expected(3, 3) = variance;  // columns along x
-  expected(5, 5) = variance;  // rows along -z
+  expected(3, 3) = 0.25;  // columns along x
+  expected(5, 5) = 0.64;  // rows along -z
   EXPECT_TRUE(covariance.isApprox(expected, 1e-12)) << covariance;
   // Two equal views that both know everything share the error.
   information.view_curvatures = {0.5 * PoseMatrix::Identity(), 0.5 * PoseMatrix::Identity()};
   const PoseMatrix shared =
-      calibration_covariance(information, std::vector{view, view}, Eigen::Vector3d::Zero(), 0.5);
+      shift_covariance(information, std::vector{view, view}, std::vector{shift_mm, shift_mm});
   EXPECT_TRUE(shared.isApprox(0.5 * expected, 1e-12)) << shared;
 }
 
@@ -210,6 +209,14 @@ TEST(Calibration, WidensWhatThePoseDoesNotExplain) {
   EXPECT_EQ(covariance_inflation("rg", bone).pose, covariance_inflation("ssd", bone).pose);
   EXPECT_TRUE(std::isnan(covariance_inflation("rg", {}).pose));
   EXPECT_TRUE(std::isnan(covariance_inflation("rg", {}).tre));
+}
+
+TEST(Calibration, CoarserSamplesShiftImagesMore) {
+  EXPECT_EQ(interpolation_shift_mm(0.0), 0.0);
+  EXPECT_GT(interpolation_shift_mm(1.0), 0.0);
+  EXPECT_DOUBLE_EQ(interpolation_shift_mm(3.0), 3.0 * interpolation_shift_mm(1.0));
+  // No DRR is a pixel off, or nobody would register by it.
+  EXPECT_LT(interpolation_shift_mm(1.0), 0.1);
 }
 
 // One view has constants of its own: its covariance is one of two views only by name.

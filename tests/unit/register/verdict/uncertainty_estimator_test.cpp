@@ -137,6 +137,17 @@ TEST(BentCurvature, KeepsDirectionsThatAreKnown) {
   EXPECT_TRUE(bent_curvature(-PoseMatrix::Identity(), PoseMatrix::Identity()).isZero());
 }
 
+TEST(BentCurvature, RaisesWhatDrownsInScatter) {
+  PoseVector sizes;
+  sizes << 100, 50, 20, 3, 2.5, -3;
+  PoseVector gradients;  // standard deviations, per mm
+  gradients << 60, 60, 60, 2, 4, 60;
+  const PoseMatrix scatter = gradients.cwiseAbs2().asDiagonal();
+  const PoseMatrix bent = bent_curvature(sizes.asDiagonal(), PoseMatrix::Identity(), scatter);
+  sizes.tail<3>() << 3, 4 / kScatterLengthMm, 100 * kDrownedCurvature;
+  EXPECT_TRUE(bent.isApprox(PoseMatrix(sizes.asDiagonal()), 1e-12)) << bent;
+}
+
 /// Sums of squares from start to end, at one resolution.
 RegistrationOptions squares() {
   RegistrationOptions options = preset_options("paper");
@@ -316,6 +327,39 @@ TEST(UncertaintyEstimator, CalibratesTresByThemselves) {
   EXPECT_NEAR(report.tre_rms_mm, tre.rms_mm, 1e-9 * tre.rms_mm);
   EXPECT_NEAR(report.tre_95_mm, tre.upper_95_mm, 1e-9 * tre.upper_95_mm);
   EXPECT_TRUE(std::isnan(report.depth_95_mm)) << "two views show depth";
+}
+
+// What all starts share: residuals do not show it, so it is added, whatever the pose explains.
+TEST(UncertaintyEstimator, AddsWhatInterpolationShifts) {
+  const test::SmallCase small = test::small_case();
+  const auto problem = std::make_shared<RegistrationProblem>(*small.problem);
+  problem->target_points_ct = {problem->center_ct_mm};
+  RegistrationResult result;
+  result.room_from_ct = small.gold_room_from_ct;
+  result.similarity = 1.0;
+  result.chain = "squares";
+  const auto at_spacing = [&](double spacing_mm, double calibration_px = 0.0) {
+    for (RegistrationView& view : problem->views) view.sample_spacing_mm = spacing_mm;
+    UncertaintyOptions uncertainty;
+    uncertainty.calibration_error_px = calibration_px;
+    return UncertaintyEstimator(problem, squares(), uncertainty)
+        .report(result, std::vector<ViewValue>{{0.9, 0.9, false, 0.1}});
+  };
+  const UncertaintyReport none = at_spacing(0.0);
+  const UncertaintyReport fine = at_spacing(1.0);
+  const UncertaintyReport coarse = at_spacing(2.0);
+  ASSERT_TRUE(std::isfinite(none.covariance_deg_mm[0]));
+  EXPECT_GT(fine.tre_95_mm, none.tre_95_mm);
+  EXPECT_GT(coarse.tre_95_mm, fine.tre_95_mm);
+  EXPECT_EQ(coarse.confidence, none.confidence);
+  EXPECT_EQ(coarse.inflation, none.inflation);
+  const PoseMatrix stated = from_deg_mm(none.covariance_deg_mm);
+  const PoseMatrix by_fine = from_deg_mm(fine.covariance_deg_mm) - stated;
+  EXPECT_TRUE((from_deg_mm(coarse.covariance_deg_mm) - stated).isApprox(4.0 * by_fine, 1e-6));
+  // A calibration that shifts images as much does the same: pixels of 3 mm, at 650 of 1000 mm.
+  const double as_much_px = interpolation_shift_mm(1.0) / (3.0 * 0.65);
+  EXPECT_TRUE((from_deg_mm(at_spacing(0.0, as_much_px).covariance_deg_mm) - stated)
+                  .isApprox(by_fine, 1e-6));
 }
 
 TEST(UncertaintyEstimator, SaysNothingWhereNoViewCanBeJudged) {
