@@ -12,6 +12,7 @@ namespace {
 
 using Eigen::Vector3d;
 
+constexpr std::string_view kJaw = "jaw";
 constexpr int kBrainHu = 35;
 constexpr int kWaterHu = 5;
 constexpr int kToothHu = 1800;
@@ -211,7 +212,8 @@ void add_dental_implant(const Vector3d& crown, const Vector3d& root, std::vector
 
 void add_teeth(const Anatomy& anatomy, std::vector<Solid>& solids, bool has_fillings) {
   const double filled = anatomy.between("filled", 0.0, 0.35, 0.0);
-  for (const bool is_upper : {true, false})
+  for (const bool is_upper : {true, false}) {
+    const std::size_t first = solids.size();
     for (int i = 0; i < 16; ++i) {
       const int tooth = (is_upper ? 100 : 200) + i;
       const double angle_deg = 10.8 * (i - 7.5);
@@ -234,6 +236,8 @@ void add_teeth(const Anatomy& anatomy, std::vector<Solid>& solids, bool has_fill
         solids.push_back(ellipsoid(
             crown + Vector3d(0.0, 0.0, is_upper ? -2.2 : 2.2), {2.8, 2.6, 1.8}, kAmalgamHu));
     }
+    if (!is_upper) give_to_bone(kJaw, solids, first);
+  }
 }
 
 /// Beaks at the front of a cervical body.
@@ -292,7 +296,8 @@ void add_neck(const Anatomy& anatomy, std::vector<Solid>& solids) {
       Vector3d(0.0, -34.0, -44.0), Vector3d(0.0, -14.0, -72.0), Vector3d(0.0, -14.0, -150.0)};
   for (std::size_t i = 1; i < airway.size(); ++i)
     solids.push_back(capsule_between(airway[i - 1], airway[i], 7.5, kGasHu));
-  solids.push_back(ellipsoid({0.0, -56.0, -76.0}, {22.0, 26.0, 15.0}, 55));  // tongue
+  solids.push_back(ellipsoid({0.0, -56.0, -76.0}, {22.0, 26.0, 15.0}, 55));
+  solids.back().bone = kJaw;  // the tongue lies in its arch
 }
 
 /// A plate over a craniotomy.
@@ -334,15 +339,20 @@ void add_drawn_implants(const Anatomy& anatomy, bool has_metal, Phantom& phantom
 Phantom head_phantom(bool has_metal, const Anatomy& anatomy) {
   constexpr double kBoxHalfMm = 30.0;
   constexpr double kWaveMm = 1.8;
-  Phantom phantom{
-      {}, {96.0, 122.0, 130.0}, target_box_at({0.0, -14.0, -14.0}, 2.0 * kBoxHalfMm), {}};
+  Phantom phantom{{},
+                  {96.0, 122.0, 130.0},
+                  target_box_at({0.0, -14.0, -14.0}, 2.0 * kBoxHalfMm),
+                  {},
+                  {{kJaw, target_box_at({0.0, -66.0, -92.0}, 2.0 * kBoxHalfMm)}}};
   std::vector<Solid>& solids = phantom.solids;
   add_soft_tissue(anatomy, solids);
   add_vault(anatomy, solids);
   add_skull_base(anatomy, solids);
   add_orbits(anatomy, solids);
   add_nose_and_cheeks(anatomy, solids);
+  const std::size_t mandible = solids.size();
   add_mandible(anatomy, solids);
+  give_to_bone(kJaw, solids, mandible);
   add_neck(anatomy, solids);
   add_teeth(anatomy, solids, has_metal);
   if (anatomy.is_typical()) {

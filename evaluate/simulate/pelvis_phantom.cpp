@@ -14,6 +14,8 @@ namespace {
 
 using Eigen::Vector3d;
 
+constexpr std::string_view kLeftFemur = "left-femur";
+constexpr std::string_view kRightFemur = "right-femur";
 constexpr int kMarrowHu = -60;
 constexpr int kCartilageHu = 90;
 constexpr int kLinerHu = -80;  // polyethylene
@@ -116,6 +118,15 @@ void add_pubis_and_ischium(const Anatomy& anatomy, double side, BonePainter& bon
   bone.add_capsule(at(70.0, 34.0, -22.0), at(58.0, 48.0, -26.0), 5.0);  // ischial spine
 }
 
+std::string_view femur_of(double side) {
+  return side > 0.0 ? kLeftFemur : kRightFemur;
+}
+
+/// Its head, neck and trochanters.
+PhantomBone movable_femur(double side) {
+  return {femur_of(side), target_box_at(mirrored({115.0, 5.0, -25.0}, side), 60.0)};
+}
+
 void add_femur(const Anatomy& anatomy, double side, BonePainter& bone) {
   const auto at = [&](const Vector3d& point) { return mirrored(point, side); };
   const double head = anatomy.factor("femoral head", 0.04) * (1.0 + 0.06 * hip_wear(anatomy, side));
@@ -188,9 +199,13 @@ void add_hip(const Anatomy& anatomy, double side, std::vector<Solid>& solids) {
   solids.push_back(capsule_between(
       mirrored(hip_mm, side), mirrored(hip_mm, side) + 22.0 * opening, 27.0, kCartilageHu));
   add_hip_wear(anatomy, side, opening, solids);
+  const std::size_t femur = solids.size();
   add_shaft(anatomy, side, solids);
-  BonePainter bone(solids, 1.8 * anatomy.shell());
-  add_femur(anatomy, side, bone);
+  {
+    BonePainter bone(solids, 1.8 * anatomy.shell());
+    add_femur(anatomy, side, bone);
+  }
+  give_to_bone(femur_of(side), solids, femur);
 }
 
 void add_sacrum(const Anatomy& anatomy, std::vector<Solid>& solids) {
@@ -239,19 +254,25 @@ void add_lumbar_spine(const Anatomy& anatomy, std::vector<Solid>& solids) {
   for (const Vertebra& v : vertebrae) add_vertebra(varied(v, anatomy, v.level), solids);
 }
 
-/// A total hip prosthesis; the bodies are those of the left side.
+/// A total hip prosthesis; the bodies are those of the left side. Neck, ball and stem are the
+/// femur's.
 void add_prosthesis(double side, std::vector<Solid>& solids) {
-  const auto add = [&](Solid solid) {
+  const std::string_view femur = femur_of(side);
+  const auto add = [&](Solid solid, std::string_view bone = {}) {
     // The mirror image of a body of revolution: its axis mirrored.
     const Vector3d axis = mirrored(solid.rotation.col(2), side);
     solid.center_mm = mirrored(solid.center_mm, side);
     if (side < 0.0) solid.rotation = rotation_between(Vector3d::UnitZ(), axis);
+    solid.bone = bone;
     solids.push_back(solid);
   };
   const Vector3d opening = Vector3d(0.66, -0.26, -0.70).normalized();
-  // The resected neck's place heals with soft tissue; liner and metal cup face outwards.
-  add(ellipsoid(hip_mm, Vector3d::Constant(29.0), kMuscleHu));
-  add(capsule_between(hip_mm, {112.0, 4.0, -12.0}, 17.0, kMuscleHu));
+  // The places of the socket's lining and of the resected head and neck heal with soft tissue;
+  // liner and metal cup face outwards. Wherever the femur is, its resected head is not.
+  const Solid healed = ellipsoid(hip_mm, Vector3d::Constant(29.0), kMuscleHu);
+  add(healed);
+  add(healed, femur);
+  add(capsule_between(hip_mm, {112.0, 4.0, -12.0}, 17.0, kMuscleHu), femur);
   Solid cup = ellipsoid(hip_mm, Vector3d::Constant(27.0), kTitaniumHu);
   cup.shape = Solid::Shape::HalfEllipsoid;
   cup.rotation = rotation_between(Vector3d::UnitZ(), -opening);
@@ -266,10 +287,10 @@ void add_prosthesis(double side, std::vector<Solid>& solids) {
                         2.8,
                         kTitaniumHu));
   const Vector3d shoulder(128.0, 8.0, -28.0);
-  add(capsule_between(hip_mm, shoulder, 6.5, kTitaniumHu));
-  add(ellipsoid(hip_mm, Vector3d::Constant(16.0), kTitaniumHu));  // ball
-  add(capsule_between(shoulder, {131.0, 8.0, -75.0}, 9.5, kTitaniumHu));
-  add(capsule_between({132.0, 8.0, -60.0}, {126.0, 5.0, -145.0}, 6.5, kTitaniumHu));
+  add(capsule_between(hip_mm, shoulder, 6.5, kTitaniumHu), femur);
+  add(ellipsoid(hip_mm, Vector3d::Constant(16.0), kTitaniumHu), femur);  // ball
+  add(capsule_between(shoulder, {131.0, 8.0, -75.0}, 9.5, kTitaniumHu), femur);
+  add(capsule_between({132.0, 8.0, -60.0}, {126.0, 5.0, -145.0}, 6.5, kTitaniumHu), femur);
 }
 
 /// Implants and calcifications that the typical adult lacks.
@@ -283,12 +304,14 @@ void add_drawn_implants(const Anatomy& anatomy, bool has_metal, Phantom& phantom
     add_prosthesis(-1.0, solids);
     phantom.findings.emplace_back("a hip prosthesis on the right");
   } else if (anatomy.has("neck screws", 0.1)) {
+    const std::size_t screws = solids.size();
     for (int i = 0; i < 3; ++i) {
       const Vector3d offset(0.0, i == 0 ? -7.0 : 7.0, i == 2 ? 7.0 : -6.0);
       const Vector3d head = mirrored(Vector3d(148.0, 10.0, -36.0) + offset, -1.0);
       const Vector3d tip = mirrored(hip_mm + 0.8 * offset, -1.0);
       solids.push_back(capsule_between(head, tip, 3.2, kTitaniumHu));
     }
+    give_to_bone(kRightFemur, solids, screws);
     phantom.findings.emplace_back("screws in the right femoral neck");
   }
   constexpr int kStoneHu = 700;
@@ -305,7 +328,11 @@ void add_drawn_implants(const Anatomy& anatomy, bool has_metal, Phantom& phantom
 Phantom pelvis_phantom(bool has_metal, const Anatomy& anatomy) {
   constexpr double kBoxHalfMm = 30.0;
   constexpr double kWaveMm = 3.0;
-  Phantom phantom{{}, {190.0, 130.0, 150.0}, target_box_at({76.0, 0.0, 6.0}, 2.0 * kBoxHalfMm), {}};
+  Phantom phantom{{},
+                  {190.0, 130.0, 150.0},
+                  target_box_at({76.0, 0.0, 6.0}, 2.0 * kBoxHalfMm),
+                  {},
+                  {movable_femur(1.0), movable_femur(-1.0)}};
   std::vector<Solid>& solids = phantom.solids;
   add_soft_tissue(anatomy, solids);
   add_sacrum(anatomy, solids);

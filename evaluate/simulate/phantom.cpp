@@ -3,6 +3,7 @@
 
 #include <array>
 
+#include "base/joined.h"
 #include "base/named_rows.h"
 #include "evaluate/simulate/head_phantom.h"
 #include "evaluate/simulate/pelvis_phantom.h"
@@ -33,6 +34,12 @@ std::vector<std::string> phantom_names() {
 
 std::string phantom_help() {
   return help_of(kPhantoms);
+}
+
+std::string bone_help() {
+  return joined(kPhantoms, "; ", [](const KnownPhantom& phantom) {
+    return std::string(phantom.name) + ": " + joined(names_of(phantom.make(false, {}).bones));
+  });
 }
 
 Phantom make_phantom(const std::string& name,

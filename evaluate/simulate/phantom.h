@@ -9,6 +9,9 @@ namespace af {
 std::vector<std::string> phantom_names();
 std::string phantom_help();
 
+/// The bones of each phantom that can be moved: "spine: T9, T10 ...; pelvis: ...".
+std::string bone_help();
+
 /// A phantom by its name; InputError for any other. With a seed, the patient of that number instead
 /// of the typical adult.
 Phantom make_phantom(const std::string& name,

@@ -108,6 +108,14 @@ Solid shaped(Solid solid, const Habitus& habitus) {
   return solid;
 }
 
+/// At the patient's place, as large as before.
+RegistrationTarget shaped(const RegistrationTarget& target, const Habitus& habitus) {
+  const CtBox& box = target.box_ct;
+  const Vector3d half = 0.5 * (box.high_mm - box.low_mm);
+  const Vector3d middle = habitus(0.5 * (box.high_mm + box.low_mm));
+  return {habitus(target.center_ct_mm), {middle - half, middle + half}};
+}
+
 }  // namespace
 
 bool Phantom::has_metal() const {
@@ -131,11 +139,8 @@ Phantom shaped(Phantom phantom, const Anatomy& anatomy, const Habitus& habitus) 
   }
   const Vector3d room_mm = Vector3d(1.0, 1.0, 0.0) * std::max(0.0, anatomy.fat_mm());
   phantom.half_sizes_mm = phantom.half_sizes_mm.cwiseProduct(habitus.stretch()) + room_mm;
-  CtBox& box = phantom.target.box_ct;
-  const Vector3d half = 0.5 * (box.high_mm - box.low_mm);
-  const Vector3d middle = habitus(0.5 * (box.high_mm + box.low_mm));
-  phantom.target.center_ct_mm = habitus(phantom.target.center_ct_mm);
-  box = {middle - half, middle + half};
+  phantom.target = shaped(phantom.target, habitus);
+  for (PhantomBone& bone : phantom.bones) bone.target = shaped(bone.target, habitus);
   if (cancellous < 0.65) phantom.findings.emplace_back("thin bone");
   if (anatomy.arthrosis() > 0.3) phantom.findings.emplace_back("arthrosis");
   if (habitus.cobb_deg() >= 10.0)
@@ -225,6 +230,10 @@ void BonePainter::add_capsule(const Vector3d& a, const Vector3d& b, double radiu
 
 void BonePainter::add_chain(const std::vector<Vector3d>& points, double radius_mm) {
   for (std::size_t i = 1; i < points.size(); ++i) add_capsule(points[i - 1], points[i], radius_mm);
+}
+
+void give_to_bone(std::string_view bone, std::vector<Solid>& solids, std::size_t first) {
+  for (std::size_t i = first; i < solids.size(); ++i) solids[i].bone = bone;
 }
 
 void add_gas(const Anatomy& anatomy, const CtBox& box, std::vector<Solid>& solids) {

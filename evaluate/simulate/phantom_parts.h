@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/described_fields.h"
@@ -27,12 +28,19 @@ struct PhantomOptions {
 
 std::vector<std::string> problems(const PhantomOptions& options);
 
+/// A bone that can be moved by itself.
+struct PhantomBone {
+  std::string_view name;      ///< as its bodies have it
+  RegistrationTarget target;  ///< the bone, or what there is most of it to see
+};
+
 /// A synthetic patient in DICOM LPS (left +x, back +y, head +z).
 struct Phantom {
   std::vector<Solid> solids;      ///< in painting order
   Eigen::Vector3d half_sizes_mm;  ///< of the volume around the origin
   RegistrationTarget target;
   std::vector<std::string> findings;  ///< what differs from the typical adult, in words
+  std::vector<PhantomBone> bones = {};
 
   [[nodiscard]] bool has_metal() const;  ///< denser than a scanner's range
 };
@@ -87,6 +95,9 @@ class BonePainter {
   double shell_mm_;
   std::vector<Solid> cores_;
 };
+
+/// Bodies from number `first` on move with `bone`.
+void give_to_bone(std::string_view bone, std::vector<Solid>& solids, std::size_t first);
 
 /// Bubbles of bowel gas within a box; none in the typical adult, who has its own.
 void add_gas(const Anatomy& anatomy, const CtBox& box, std::vector<Solid>& solids);

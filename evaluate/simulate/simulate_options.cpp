@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "base/named_rows.h"
 #include "base/number_text.h"
 #include "evaluate/simulate/phantom.h"
 #include "geometry/target_box.h"
@@ -86,6 +87,13 @@ void describe_truth(Fields& field, SimulateOptions& o) {
         o.max_offset_translation_mm,
         "... and moved by at most this along each axis, mm")
       .within(0.0, 1000.0);
+  field("moved_bone",
+        o.moved_bone,
+        "Phantoms only: the X-rays, which are then of the bodies themselves, show this bone turned "
+        "by 2 to 5 degrees and moved by 2 to 6 mm against the rest, as --seed has it; the CT does "
+        "not. The bone is then the target, the true pose is its own, and the draws above are of "
+        "the rest. " +
+            bone_help());
   field("no_fiducials", o.omits_fiducials, "No steel pins (four of 2 x 6 mm otherwise)");
 }
 
@@ -99,12 +107,25 @@ void append_scan_problems(const SimulateOptions& options, std::vector<std::strin
   if (!options.stress.names.empty())
     found.push_back(
         "stress: applies to studies only; a scan's X-rays have the Imaging effects alone");
+  if (!options.moved_bone.empty())
+    found.push_back("moved-bone: applies to studies only; a scan's X-rays show what its CT holds");
   if (options.xray_format != "mha")
     found.push_back("xray_format = " + options.xray_format + ": a scan's X-rays are mha");
   for (const double elevation : scan.elevations_deg)
     if (!(std::abs(elevation) <= 80.0))
       found.push_back("elevations_deg = " + number_text(elevation) +
                       ": must be between -80 and 80 degrees");
+}
+
+void append_bone_problems(const SimulateOptions& options, std::vector<std::string>& found) {
+  if (options.moved_bone.empty()) return;
+  if (options.phantom.empty()) {
+    found.push_back("moved-bone: applies to --phantom only; a CT does not tell bones apart");
+    return;
+  }
+  const std::vector<PhantomBone> bones = make_phantom(options.phantom, false).bones;
+  if (find_row(bones, options.moved_bone) == nullptr)
+    found.push_back(unknown_name_text(bones, "moved-bone", options.moved_bone));
 }
 
 /// Studies are refused whose target box breaks the rule of target_box_problem().
@@ -146,6 +167,7 @@ std::vector<std::string> problems(const SimulateOptions& options) {
     found.push_back("metal: applies to --phantom only; a CT has its own metal or none");
   if (options.phantom_options.anatomy_seed && options.phantom.empty())
     found.push_back("anatomy-seed: applies to --phantom only; a CT is of one patient");
+  append_bone_problems(options, found);
   append_target_problems(options, found);
   append_scan_problems(options, found);
   const int bits = options.xray_in_force().detector.bits;
@@ -158,8 +180,11 @@ std::vector<std::string> problems(const SimulateOptions& options) {
 }
 
 Phantom phantom_of(const SimulateOptions& options) {
-  return make_phantom(
+  Phantom phantom = make_phantom(
       options.phantom, options.phantom_options.has_metal, options.phantom_options.anatomy_seed);
+  if (!options.moved_bone.empty())
+    phantom.target = required_row(phantom.bones, "moved-bone", options.moved_bone).target;
+  return phantom;
 }
 
 void ConeBeamOptions::describe(Fields& field) {

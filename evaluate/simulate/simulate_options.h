@@ -43,6 +43,7 @@ struct SimulateOptions {
 
   double max_offset_rotation_deg = 5.0;
   double max_offset_translation_mm = 10.0;
+  std::string moved_bone;  ///< of the phantom
   bool omits_fiducials = false;
 
   AttenuationModel attenuation;
@@ -54,6 +55,10 @@ struct SimulateOptions {
   /// The imaging chain that is used: `xray`, or all its effects off when is_ideal, with the wanted
   /// stress.
   [[nodiscard]] XraySimulationOptions xray_in_force() const;
+  /// Whether X-rays are of a phantom's bodies, not of voxels.
+  [[nodiscard]] bool images_bodies() const {
+    return phantom_options.anatomy_seed.has_value() || !moved_bone.empty();
+  }
   /// case_name, or one made from the CT's file name or the phantom.
   [[nodiscard]] std::string case_name_in_force() const;
   void describe(Fields& field);
@@ -61,7 +66,7 @@ struct SimulateOptions {
 
 std::vector<std::string> problems(const SimulateOptions& options);
 
-/// The phantom that is asked for.
+/// The phantom that is asked for; its target is the moved bone, if there is one.
 Phantom phantom_of(const SimulateOptions& options);
 
 }  // namespace af::tools

@@ -16,6 +16,7 @@
 #include "evaluate/simulate/automatic_target.h"
 #include "evaluate/simulate/calibration_error.h"
 #include "evaluate/simulate/ct_degradation.h"
+#include "evaluate/simulate/moved_bone.h"
 #include "evaluate/simulate/phantom.h"
 #include "evaluate/simulate/simulate_options.h"
 #include "evaluate/simulate/simulated_scan.h"
@@ -27,6 +28,8 @@
 #include "files/output_file.h"
 #include "files/partial_folder.h"
 #include "geometry/fiducial_registration.h"
+#include "geometry/target_box.h"
+#include "geometry/tre.h"
 #include "ranks/progress_printer.h"
 #include "ranks/provenance.h"
 #include "ranks/terminal.h"
@@ -43,13 +46,24 @@ namespace {
 /// Standard deviation of fiducial detections in column and row.
 constexpr double kFiducialSigmaPx = 0.2;
 
+/// A bone that X-rays show at another place than the CT.
+struct MovedBone {
+  std::string name;
+  RigidTransform rest_from_bone;
+  double displacement_mm;  ///< mean over the target box
+  std::string text;        ///< in words
+};
+
 /// A case before its X-rays are taken: where the patient lies and what is to be found.
 struct SimulatedCase {
-  StudyCase study_case;        ///< without file names; gold_room_from_ct is the true pose
-  PoseParameters true_offset;  ///< of the true pose from the nominal one
-  CameraRig true_rig;          ///< that takes the X-rays; the study's own may miss it
-  std::vector<SteelCylinder> fiducials;
-  SteelBodies occluders;  ///< in the X-rays only, besides the fiducials
+  StudyCase study_case;  ///< without file names; gold_room_from_ct is the true pose
+  /// Of all but the moved bone, whose pose gold_room_from_ct is.
+  RigidTransform rest_room_from_ct = RigidTransform::Identity();
+  std::optional<MovedBone> moved_bone;
+  PoseParameters true_offset;            ///< of the true pose from the nominal one
+  CameraRig true_rig;                    ///< that takes the X-rays; the study's own may miss it
+  std::vector<SteelCylinder> fiducials;  ///< as the CT has them
+  SteelBodies occluders;                 ///< in the X-rays only, besides the fiducials
   std::vector<std::vector<Eigen::Vector2d>> exact_fiducials_px;  ///< per view, without noise
   std::optional<FiducialGold> fiducial_gold;
 };
@@ -174,6 +188,18 @@ CameraRig true_rig(const SimulateOptions& options,
   return result;
 }
 
+/// The pins where X-rays show them: with the moved bone.
+std::vector<SteelCylinder> imaged_fiducials(const SimulatedCase& simulated) {
+  std::vector<SteelCylinder> pins = simulated.fiducials;
+  if (!simulated.moved_bone) return pins;
+  const RigidTransform& rest_from_bone = simulated.moved_bone->rest_from_bone;
+  for (SteelCylinder& pin : pins) {
+    pin.center_point = rest_from_bone * pin.center_point;
+    pin.axis_direction = rest_from_bone.linear() * pin.axis_direction;
+  }
+  return pins;
+}
+
 void add_occluders(const SimulateOptions& options, const CameraRig& rig, SimulatedCase& simulated) {
   const StudyCase& study_case = simulated.study_case;
   const StressOptions& stress = options.stress;
@@ -181,13 +207,13 @@ void add_occluders(const SimulateOptions& options, const CameraRig& rig, Simulat
   for (std::size_t i = 0; i < rig.cameras.size(); ++i)
     views.push_back({rig.cameras[i], study_case.views[i].roi});
   const OccluderSite site =
-      occluder_site(views, *study_case.gold_room_from_ct, study_case.center_ct_mm);
+      occluder_site(views, simulated.rest_room_from_ct, study_case.center_ct_mm);
   const auto key = [&](const char* what) { return view_key(study_case.name, "", what); };
   if (stress.has(Stress::Rods))
     simulated.occluders.cylinders = place_rods(site, {}, options.seed, key("rods"));
   if (stress.has(Stress::Fiducials))
     simulated.occluders.balls =
-        place_balls(site, simulated.fiducials, {}, options.seed, key("balls"));
+        place_balls(site, imaged_fiducials(simulated), {}, options.seed, key("balls"));
 }
 
 /// The X-ray as people look at it: bone bright, the window over the middle 98 % of the pixels.
@@ -210,15 +236,16 @@ std::string cylinder_text(const std::string& table, const SteelCylinder& cylinde
 }
 
 /// What was simulated, in one line for people.
-std::string note_text(const SimulateOptions& options) {
+std::string note_text(const SimulateOptions& options, const SimulatedCase& simulated) {
   std::string text = "X-rays simulated by af-simulate from ";
   text += options.phantom.empty() ? "a CT" : "the " + options.phantom + " phantom";
   if (options.phantom_options.has_metal) text += " with metal";
   if (options.phantom_options.anatomy_seed) {
     text += ", patient " + std::to_string(*options.phantom_options.anatomy_seed);
     for (const std::string& finding : phantom_of(options).findings) text += ", " + finding;
-    text += "; X-rays of the bodies themselves, voxels in the CT only";
   }
+  if (options.images_bodies()) text += "; X-rays of the bodies themselves, voxels in the CT only";
+  if (simulated.moved_bone) text += "; " + simulated.moved_bone->text;
   const std::vector<StressDescription> stress = descriptions(options.stress);
   if (stress.empty()) return text;
   text += ", made harder by";
@@ -237,6 +264,14 @@ std::string truth_text(const SimulatedCase& simulated) {
       "center_ct_mm\nrotation_deg = " +
       toml_array(Eigen::Vector3d(offset[0], offset[1], offset[2])) +
       "\ntranslation_mm = " + toml_array(Eigen::Vector3d(offset[3], offset[4], offset[5])) + "\n";
+  if (simulated.moved_bone) {
+    text += "\n[moved_bone]                     # whose pose that is\nname = \"" +
+            simulated.moved_bone->name +
+            "\"\ndisplacement_mm = " + number_text(simulated.moved_bone->displacement_mm) +
+            "          # mean over the target box\n" +
+            "\n[rest]                           # all but the bone\n" +
+            pose_to_toml(simulated.rest_room_from_ct);
+  }
   if (simulated.fiducial_gold) {
     text += "\n[fiducial_gold]\n" + pose_to_toml(simulated.fiducial_gold->room_from_ct) +
             "\nfre_mm = " + number_text(simulated.fiducial_gold->fit.fre_mm) + "\n";
@@ -250,6 +285,37 @@ std::string truth_text(const SimulatedCase& simulated) {
     text += "\n[[view]]\ncamera = \"" + study_case.views[i].camera +
             "\"\nexact_fiducials_px = " + toml_rows(simulated.exact_fiducials_px[i]) + "\n";
   return text;
+}
+
+/// Draws the true pose, and a wanted bone's motion against the rest.
+void draw_poses(const SimulateOptions& options, const PoseFrame& frame, SimulatedCase& simulated) {
+  StudyCase& study_case = simulated.study_case;
+  simulated.true_offset = drawn_offset(options, study_case.name);
+  simulated.rest_room_from_ct = pose_from_parameters(frame, simulated.true_offset);
+  study_case.gold_room_from_ct = simulated.rest_room_from_ct;
+  const std::string& bone = options.moved_bone;
+  if (bone.empty()) return;
+  const CtBox& box = study_case.target_box_ct;
+  const Eigen::Vector3d middle = 0.5 * (box.low_mm + box.high_mm);
+  const RigidTransform still = RigidTransform::Identity();
+  const RigidTransform rest_from_bone =
+      drawn_rest_from_bone(phantom_of(options),
+                           bone,
+                           middle,
+                           options.seed,
+                           view_key(study_case.name, "", ("moved " + bone).c_str()));
+  study_case.gold_room_from_ct = simulated.rest_room_from_ct * rest_from_bone;
+  simulated.true_offset = parameters_from_pose(frame, *study_case.gold_room_from_ct);
+  const double displacement_mm = mean_tre_mm(rest_from_bone, still, target_points(box));
+  simulated.moved_bone = {
+      bone,
+      rest_from_bone,
+      displacement_mm,
+      bone + " turned by " +
+          fixed_text(rotation_angle_between_rad(still, rest_from_bone) * kDegPerRad, 1) +
+          " deg and moved by " + fixed_text((rest_from_bone * middle - middle).norm(), 1) +
+          " mm against the rest (" + fixed_text(displacement_mm, 1) +
+          " mm over the target box) in the X-rays, not in the CT"};
 }
 
 /// Chooses target, regions, true pose, true cameras, fiducials and occluders. Throws InputError
@@ -270,11 +336,10 @@ SimulatedCase plan_case(const SimulateOptions& options,
   frame.center_ct_mm = target.center_ct_mm;
   frame.center_room_mm = rig.isocenter_point;
   study_case.nominal_room_from_ct = frame.nominal_room_from_ct();
-  simulated.true_offset = drawn_offset(options, study_case.name);
-  study_case.gold_room_from_ct = pose_from_parameters(frame, simulated.true_offset);
+  draw_poses(options, frame, simulated);
 
   for (const CameraGeometry& camera : rig.cameras) {
-    refuse_source_inside(camera, *study_case.gold_room_from_ct, volume.grid());
+    refuse_source_inside(camera, simulated.rest_room_from_ct, volume.grid());
     const Eigen::Vector2i wanted_px = options.roi_px.size() == 2
                                           ? Eigen::Vector2i(options.roi_px[0], options.roi_px[1])
                                           : default_region_size_px(camera);
@@ -286,7 +351,7 @@ SimulatedCase plan_case(const SimulateOptions& options,
   simulated.true_rig = true_rig(options, rig, study_case);
   if (!options.omits_fiducials) add_fiducials(options, ct, rig, simulated);
   add_occluders(options, rig, simulated);
-  study_case.note = note_text(options);
+  study_case.note = note_text(options, simulated);
   return simulated;
 }
 
@@ -296,14 +361,20 @@ std::optional<SmoothMotion> wanted_motion(const SimulateOptions& options,
   SmoothMotionOptions motion;
   motion.threads = options.xray.threads;
   const StudyCase& study_case = simulated.study_case;
-  return SmoothMotion(
-      study_case.target_box_ct, motion, options.seed, view_key(study_case.name, "", "motion"));
+  CtBox still_box = study_case.target_box_ct;
+  if (simulated.moved_bone) {  // where it is now
+    Eigen::AlignedBox3d box;
+    for (const Eigen::Vector3d& corner : still_box.corner_points())
+      box.extend(simulated.moved_bone->rest_from_bone * corner);
+    still_box = {box.min(), box.max()};
+  }
+  return SmoothMotion(still_box, motion, options.seed, view_key(study_case.name, "", "motion"));
 }
 
 SteelBodies all_steel(const SimulatedCase& simulated) {
   SteelBodies steel = simulated.occluders;
-  steel.cylinders.insert(
-      steel.cylinders.end(), simulated.fiducials.begin(), simulated.fiducials.end());
+  const std::vector<SteelCylinder> pins = imaged_fiducials(simulated);
+  steel.cylinders.insert(steel.cylinders.end(), pins.begin(), pins.end());
   return steel;
 }
 
@@ -315,11 +386,13 @@ XraySimulator voxel_simulator(const SimulateOptions& options,
 }
 
 /// The simulator of this case's X-rays from a phantom's bodies themselves, with the wanted
-/// non-rigid motion.
+/// motions.
 XraySimulator body_simulator(const SimulateOptions& options,
                              const Phantom& phantom,
                              const SimulatedCase& simulated) {
-  return {phantom,
+  return {simulated.moved_bone
+              ? with_moved_bone(phantom, options.moved_bone, simulated.moved_bone->rest_from_bone)
+              : phantom,
           wanted_motion(options, simulated),
           options.attenuation,
           all_steel(simulated),
@@ -396,7 +469,7 @@ void take_xrays(const SimulateOptions& options,
     StudyView& view = study_case.views[i];
     const Image2d xray =
         simulator.xray({camera, view.roi},
-                       *study_case.gold_room_from_ct,
+                       simulated.rest_room_from_ct,
                        options.seed,
                        view_key(study_case.name, camera.name, "photons"),
                        [&](double done, double total) {
@@ -429,12 +502,13 @@ void write_study_files(const SimulateOptions& options,
   record["stress"] = nlohmann::json::array();
   for (const StressDescription& stress : descriptions(options.stress))
     record["stress"].push_back({{"name", stress.name}, {"text", stress.text}});
+  if (simulated.moved_bone) record["moved_bone"] = simulated.moved_bone->text;
   write_text_file(folder / "provenance.json", record.dump(2) + "\n");
   write_reproduce_script(folder, provenance);
 }
 
 /// A patient as X-rays and as the CT show them. The two differ where the CT clips metal; and X-rays
-/// of drawn anatomies are of the bodies, not of voxels.
+/// of drawn anatomies and moved bones are of the bodies, not of voxels.
 struct Patient {
   CtVolume anatomy;
   CtVolume ct;
@@ -448,7 +522,7 @@ Patient patient(const SimulateOptions& options, const Communicator& world) {
     Phantom phantom = phantom_of(options);
     const CtVolume anatomy = sample_phantom(phantom, sampling);
     const CtVolume ct = phantom.has_metal() ? with_scanner_range(anatomy) : anatomy;
-    if (!sampling.anatomy_seed) return {anatomy, ct, std::nullopt};
+    if (!options.images_bodies()) return {anatomy, ct, std::nullopt};
     return {anatomy, ct, std::move(phantom)};
   }
   std::vector<std::string> warnings;
@@ -523,6 +597,7 @@ std::string summary(const SimulatedCase& simulated, const std::filesystem::path&
   std::string text = "True pose, relative to nominal:";
   for (std::size_t i = 0; i < 6; ++i)
     text += ' ' + fixed_text(offset[i], 2) + (i < 3 ? " deg" : " mm");
+  if (simulated.moved_bone) text += "\nIt is that of the moved bone: " + simulated.moved_bone->text;
   if (simulated.fiducial_gold) {
     const RigidTransform& gold = *simulated.study_case.gold_room_from_ct;
     const RigidTransform& fitted = simulated.fiducial_gold->room_from_ct;

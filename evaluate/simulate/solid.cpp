@@ -13,7 +13,6 @@
 #include "base/hash_random.h"
 #include "evaluate/simulate/parallel_rows.h"
 #include "evaluate/simulate/solid_chords.h"
-#include "geometry/rigid_transform.h"
 
 namespace af {
 
@@ -192,7 +191,8 @@ bool Solid::contains(const Eigen::Vector3d& ct_point_mm) const {
 
 int Solid::hu_at(const Eigen::Vector3d& ct_point_mm) const {
   if (texture_hu == 0) return hu;
-  return hu + nearest_hu(texture_hu * texture(ct_point_mm + texture_shift_mm, texture_scale_mm));
+  return hu + nearest_hu(texture_hu * texture(texture_rotation * (ct_point_mm + texture_shift_mm),
+                                              texture_scale_mm));
 }
 
 Eigen::Vector3d Solid::reach_mm() const {
@@ -215,6 +215,15 @@ Solid capsule_between(const Eigen::Vector3d& a,
   solid.half_sizes_mm = {radius_mm, radius_mm, 0.5 * (b - a).norm()};
   if (a != b) solid.rotation = rotation_between(Eigen::Vector3d::UnitZ(), b - a);
   solid.hu = hu;
+  return solid;
+}
+
+Solid moved(Solid solid, const RigidTransform& motion) {
+  solid.center_mm = motion * solid.center_mm;
+  solid.rotation = motion.linear() * solid.rotation;
+  // R^T (x' - t + R s) is x + s at x' = R x + t.
+  solid.texture_shift_mm = motion.linear() * solid.texture_shift_mm - motion.translation();
+  solid.texture_rotation = solid.texture_rotation * motion.linear().transpose();
   return solid;
 }
 

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <string_view>
 #include <vector>
 
 #include "ct/ct_volume.h"
 #include "geometry/ct_box.h"
+#include "geometry/rigid_transform.h"
 
 namespace af {
 
@@ -26,7 +28,9 @@ struct Solid {
   int hu = 0;
   int texture_hu = 0;  ///< amplitude of the texture added to hu
   double texture_scale_mm = 3.0;
-  Eigen::Vector3d texture_shift_mm = Eigen::Vector3d::Zero();  ///< other values at one point
+  Eigen::Vector3d texture_shift_mm = Eigen::Vector3d::Zero();      ///< other values at one point
+  Eigen::Matrix3d texture_rotation = Eigen::Matrix3d::Identity();  ///< of shifted points
+  std::string_view bone = {};  ///< that it moves with, of PhantomBone; empty: stays with the rest
 
   [[nodiscard]] bool contains(const Eigen::Vector3d& ct_point_mm) const;
   /// HU at a point of the body, with its texture.
@@ -36,6 +40,9 @@ struct Solid {
   /// A box along the ct axes that holds the body.
   [[nodiscard]] CtBox bounds() const;
 };
+
+/// The body where a motion of the ct frame takes it, with its texture.
+Solid moved(Solid solid, const RigidTransform& motion);
 
 /// std::lround() without a call or a branch: X-rays and voxels round millions of HU.
 inline int nearest_hu(double hu) {

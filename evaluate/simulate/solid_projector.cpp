@@ -112,15 +112,18 @@ void SolidProjector::add_span(const Piece& piece,
   constexpr double kTextureStepMm = 1.5;
   const double length_mm = last_mm - first_mm;
   if (!(length_mm > 0.0)) return;
-  const int steps =
-      solid.texture_hu == 0 ? 1 : static_cast<int>(std::ceil(length_mm / kTextureStepMm));
+  if (solid.texture_hu == 0) {
+    add_length(solid.hu, length_mm * piece.stretch, sum);
+    return;
+  }
+  const int steps = static_cast<int>(std::ceil(length_mm / kTextureStepMm));
   const double step_mm = length_mm / steps;
+  const Vector3d origin = solid.texture_rotation * (piece.origin + solid.texture_shift_mm);
+  const Vector3d direction = solid.texture_rotation * piece.direction;
   for (int i = 0; i < steps; ++i) {
-    double hu = solid.hu;
-    if (solid.texture_hu != 0)
-      hu += solid.texture_hu * texture(piece.origin + solid.texture_shift_mm +
-                                           (first_mm + (i + 0.5) * step_mm) * piece.direction,
-                                       solid.texture_scale_mm);
+    const double hu =
+        solid.hu + solid.texture_hu * texture(origin + (first_mm + (i + 0.5) * step_mm) * direction,
+                                              solid.texture_scale_mm);
     add_length(nearest_hu(hu), step_mm * piece.stretch, sum);
   }
 }

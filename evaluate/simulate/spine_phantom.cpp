@@ -30,6 +30,10 @@ constexpr int kLungHu = -830;
 constexpr int kDiscHu = 90;
 constexpr int kCanalHu = 20;
 constexpr int kPlaqueHu = 1180;
+/// Vertebrae that the volume holds whole.
+constexpr std::array<std::string_view, 7> kWholeVertebrae{
+    "L3", "L2", "L1", "T12", "T11", "T10", "T9"};
+constexpr int kLowestWhole = -3;
 
 /// The curve of the spine: kyphosis above, lordosis below, a slight bend to the left.
 Vector3d spine_point(double z_mm) {
@@ -56,6 +60,28 @@ Vertebra vertebra_at(int level, const Anatomy& anatomy = {}) {
   return v;
 }
 
+/// Empty for one that the volume cuts.
+std::string_view vertebra_name(int level) {
+  const auto index = static_cast<std::size_t>(level - kLowestWhole);
+  return index < kWholeVertebrae.size() ? kWholeVertebrae[index] : std::string_view();
+}
+
+/// The body of a vertebra with its pedicles.
+RegistrationTarget vertebra_target(int level) {
+  const Vertebra v = vertebra_at(level);
+  const Vector3d half(v.half_width_mm + 4.0, v.half_depth_mm + 8.0, 18.0);
+  const Vector3d center = v.center + Vector3d(0.0, 6.0, 0.0);
+  return {center, {center - half, center + half}};
+}
+
+/// From the head down.
+std::vector<PhantomBone> whole_vertebrae() {
+  std::vector<PhantomBone> bones;
+  for (std::size_t i = kWholeVertebrae.size(); i-- > 0;)
+    bones.push_back({kWholeVertebrae[i], vertebra_target(kLowestWhole + static_cast<int>(i))});
+  return bones;
+}
+
 void add_disc(int level_below, const Anatomy& anatomy, std::vector<Solid>& solids) {
   const Vertebra below = vertebra_at(level_below, anatomy);
   const Vertebra above = vertebra_at(level_below + 1, anatomy);
@@ -65,12 +91,14 @@ void add_disc(int level_below, const Anatomy& anatomy, std::vector<Solid>& solid
                         kDiscHu));
 }
 
+/// Each vertebra has its part of the canal.
 void add_canal(const Anatomy& anatomy, std::vector<Solid>& solids) {
   for (int level = -kVertebraeEachSide - 1; level <= kVertebraeEachSide + 1; ++level) {
     const Vertebra v = vertebra_at(level, anatomy);
     solids.push_back(elliptic_cylinder(v.center + Vector3d(0.0, v.half_depth_mm + 8.0, 0.0),
                                        {9.0, 7.5, 0.5 * kPitchMm},
                                        kCanalHu));
+    solids.back().bone = vertebra_name(level);
   }
 }
 
@@ -184,8 +212,10 @@ void add_screws_and_rods(const Anatomy& anatomy,
       const Vertebra v = vertebra_at(level, anatomy);
       const Vector3d tip = v.center + Vector3d(side * 8.0, -0.4 * v.half_depth_mm, 3.0);
       const Vector3d head = v.center + Vector3d(side * 17.0, v.half_depth_mm + 22.0, 3.0);
+      const std::size_t screw = solids.size();
       solids.push_back(capsule_between(tip, head, kScrewRadiusMm, kTitaniumHu));
       solids.push_back(ellipsoid(head, Vector3d::Constant(kHeadRadiusMm), kTitaniumHu));
+      give_to_bone(vertebra_name(level), solids, screw);
       heads.push_back(head);
     }
     solids.push_back(capsule_between(heads.front(), heads.back(), kScrewRadiusMm, kTitaniumHu));
@@ -207,11 +237,13 @@ void add_drawn_implants(const Anatomy& anatomy,
     constexpr int kCementHu = 2600;
     const int level = static_cast<int>(anatomy.between("cement level", -3.0, 2.99, 0.0));
     const Vertebra v = vertebra_at(level, anatomy);
+    const std::size_t cement = solids.size();
     for (int i = 0; i < 5; ++i)
       solids.push_back(
           ellipsoid(v.center + anatomy.shift3("cement place", 3.5, i),
                     Vector3d::Constant(anatomy.between("cement size", 2.5, 6.0, 4.0, i)),
                     kCementHu));
+    give_to_bone(vertebra_name(level), solids, cement);
     findings.emplace_back("bone cement");
   }
   if (anatomy.has("clips", 0.15)) {
@@ -234,26 +266,24 @@ void add_anatomy(const Anatomy& anatomy, std::vector<Solid>& solids) {
   // One more vertebra at each end: the volume cuts through them, as a scan does.
   for (int level = -kVertebraeEachSide - 1; level <= kVertebraeEachSide; ++level)
     add_disc(level, anatomy, solids);
-  for (int level = -kVertebraeEachSide - 1; level <= kVertebraeEachSide + 1; ++level)
+  for (int level = -kVertebraeEachSide - 1; level <= kVertebraeEachSide + 1; ++level) {
+    const std::size_t first = solids.size();
     add_vertebra(vertebra_at(level, anatomy), solids);
+    give_to_bone(vertebra_name(level), solids, first);
+  }
   add_canal(anatomy, solids);
 }
 
 }  // namespace
 
-std::vector<Solid> spine_phantom_solids(bool has_metal) {
-  std::vector<Solid> solids;
-  add_anatomy({}, solids);
-  if (has_metal) add_screws_and_rods({}, -1, 1, solids);
-  return solids;
-}
-
 Phantom spine_phantom(bool has_metal, const Anatomy& anatomy) {
   const Vector3d half_mm = 0.5 * Vector3d(kWidthMm, kWidthMm, kHeightMm);
-  if (anatomy.is_typical())
-    return {spine_phantom_solids(has_metal), half_mm, spine_phantom_target(), {}};
-  Phantom phantom{{}, half_mm, spine_phantom_target(), {}};
+  Phantom phantom{{}, half_mm, spine_phantom_target(), {}, whole_vertebrae()};
   add_anatomy(anatomy, phantom.solids);
+  if (anatomy.is_typical()) {
+    if (has_metal) add_screws_and_rods({}, -1, 1, phantom.solids);
+    return phantom;
+  }
   add_drawn_implants(anatomy, has_metal, phantom.solids, phantom.findings);
   if (std::abs(fractured_level(anatomy)) <= kVertebraeEachSide)
     phantom.findings.emplace_back("an old vertebral fracture");
@@ -262,10 +292,7 @@ Phantom spine_phantom(bool has_metal, const Anatomy& anatomy) {
 }
 
 RegistrationTarget spine_phantom_target() {
-  const Vertebra middle = vertebra_at(0);
-  const Vector3d half(middle.half_width_mm + 4.0, middle.half_depth_mm + 8.0, 18.0);
-  const Vector3d center = middle.center + Vector3d(0.0, 6.0, 0.0);
-  return {center, {center - half, center + half}};
+  return vertebra_target(0);
 }
 
 std::vector<Vector3d> spine_phantom_vertebra_centers() {

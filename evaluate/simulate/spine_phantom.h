@@ -14,11 +14,9 @@ namespace af {
 /// heart, liver, stomach with gas, spleen, kidneys and aorta. Left and right differ: liver right,
 /// gas, spleen and aorta left, and the spine bends. Sizes are typical of adults, not of one person;
 /// nothing is taken from patient data. Metal: pedicle screws from T11 to L1 and two rods. `anatomy`
-/// makes another patient of it.
+/// makes another patient of it. Bones that can be moved: T9 to L3, which no face of the volume
+/// cuts.
 Phantom spine_phantom(bool has_metal, const Anatomy& anatomy = {});
-
-/// The bodies of the typical adult's phantom in painting order.
-std::vector<Solid> spine_phantom_solids(bool has_metal);
 
 /// The body of T12, the middle vertebra, with its pedicles.
 RegistrationTarget spine_phantom_target();

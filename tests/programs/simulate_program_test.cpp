@@ -3,14 +3,19 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <list>
 #include <string>
 
 #include <gtest/gtest.h>
 
 #include "ct/ct_reader.h"
+#include "evaluate/simulate/phantom.h"
 #include "evaluate/simulate/siddon_projector.h"
+#include "evaluate/simulate/solid_projector.h"
 #include "files/output_file.h"
 #include "geometry/fiducial_registration.h"
+#include "geometry/target_box.h"
+#include "geometry/tre.h"
 #include "images/dicom_elements.h"
 #include "study/pose_file.h"
 #include "study/rig_file.h"
@@ -224,6 +229,10 @@ TEST_F(AfSimulate, RefusesBadInputByTheContractsCodesAndLeavesNothing) {
       {"--phantom spine --center-ct-mm 1,2", 2, "center-ct-mm"},
       {coarse + "--stress rods,bones", 2, "bones"},
       {"--ct a --metal", 3, "metal"},
+      {"--ct a --moved-bone T12", 3, "moved-bone: applies to --phantom only"},
+      {coarse + "--moved-bone jaw", 3, "must be one of T9, T10, T11, T12, L1, L2, L3"},
+      {"--phantom head --moved-bone T12", 3, "moved-bone = 'T12': must be one of jaw"},
+      {coarse + "--moved-bone T12 --cone-beam 8", 3, "moved-bone: applies to studies only"},
       {coarse + "--bits 7", 3, "bits = 7"},
       {coarse + "--tube-kvp 10", 3, "tube-kvp = 10"},
       {coarse + "--water-mu-per-mm 0.6", 3, "water_mu_per_mm"},
@@ -310,6 +319,146 @@ TEST_F(AfSimulate, DicomXaOfObliqueViewsGivesTheLineIntegralsOfMetaImageToTheBit
     EXPECT_NEAR(*rao.number_or_none({0x0018, 0x1511}, "secondary"), -10.0, 1e-6);
   }
   EXPECT_EQ(run(coarse + "--ideal --xray-format dicom " + folder("floats")), 3);
+}
+
+/// What a bone of the drawn spine 7 adds to muscle of its shape, mm of water, in every pixel.
+Eigen::ArrayXd shadow_of(const std::string& bone,
+                         const CameraGeometry& camera,
+                         const RigidTransform& room_from_bone) {
+  Phantom phantom = make_phantom("spine", false, 7);
+  std::erase_if(phantom.solids, [&](const Solid& solid) { return solid.bone != bone; });
+  for (Solid& solid : phantom.solids) solid.hu -= 1000 + kMuscleHu;
+  const TissueModel tissue{AttenuationModel()};
+  const SolidProjector projector(phantom, tissue);
+  const RigidTransform bone_from_room = room_from_bone.inverse();
+  Eigen::ArrayXd shadow(camera.size_px.prod());
+  for (int pixel = 0; pixel < shadow.size(); ++pixel) {
+    const PathIntegrals path =
+        projector.integrate(bone_from_room * camera.source_point,
+                            bone_from_room * camera.detector_point(pixel % camera.size_px.x(),
+                                                                   pixel / camera.size_px.x()));
+    shadow[pixel] = path.water_mm + path.bone_mm;
+  }
+  return shadow;
+}
+
+double correlation(const Eigen::ArrayXd& a, const Eigen::ArrayXd& b) {
+  const Eigen::ArrayXd from_a = a - a.mean();
+  const Eigen::ArrayXd from_b = b - b.mean();
+  return (from_a * from_b).mean() / std::sqrt(from_a.square().mean() * from_b.square().mean());
+}
+
+Eigen::ArrayXd attenuation_of(const StudyView& view) {
+  const Image2d xray = read_image(view.xray);
+  return -(Eigen::Map<const Eigen::ArrayXf>(xray.pixels.data(),
+                                            static_cast<Eigen::Index>(xray.pixels.size()))
+               .cast<double>() /
+           4000.0)
+              .log();
+}
+
+class MovedT12 : public AfSimulate {
+ protected:
+  void SetUp() override {
+    rig_.cameras = {oblique_camera("front", 5.0, 3.0), oblique_camera("side", 80.0, -4.0)};
+    write_text_file(scratch_ / "rig.toml", rig_to_toml(rig_));
+  }
+  /// The drawn spine 7 in these two cameras, and its study.
+  const StudyCase& simulated(const std::string& arguments, const std::string& name) {
+    EXPECT_EQ(run(arguments_ + arguments + " " + folder(name)), 0) << log();
+    studies_.push_back(read_study(scratch_ / name / "study.toml"));
+    return studies_.back().find_case("");
+  }
+
+  CameraRig rig_;
+  std::string arguments_ = coarse + "--anatomy-seed 7 --seed 5 --rig '" +
+                           (scratch_ / "rig.toml").string() + "' --case one ";
+  std::list<Study> studies_;
+};
+
+TEST_F(MovedT12, HasItsOwnPoseInTheTruthAndTheRestHasThatOfTheSameStudyWithoutIt) {
+  const StudyCase& still = simulated("--ideal", "still");
+  const StudyCase& moved = simulated("--ideal --moved-bone T12", "moved");
+  EXPECT_EQ(moved.center_ct_mm, still.center_ct_mm);
+  EXPECT_EQ(moved.target_box_ct.low_mm, still.target_box_ct.low_mm);
+  EXPECT_EQ(moved.views[0].roi.column, still.views[0].roi.column);
+  EXPECT_EQ(read_text_file(moved.ct), read_text_file(still.ct));
+  const fs::path truth = scratch_ / "moved" / "truth.toml";
+  EXPECT_TRUE(moved.gold_room_from_ct->isApprox(read_pose(truth), 1e-12));
+  // The table [rest] as a file of its own.
+  const std::string text = read_text_file(truth);
+  const std::size_t rest_begin = text.find("room_from_ct", text.find("[rest]"));
+  write_text_file(scratch_ / "rest.toml",
+                  text.substr(rest_begin, text.find("[fiducial_gold]") - rest_begin));
+  EXPECT_TRUE(still.gold_room_from_ct->isApprox(read_pose(scratch_ / "rest.toml"), 1e-12));
+  const double displacement_mm = mean_tre_mm(
+      *moved.gold_room_from_ct, *still.gold_room_from_ct, target_points(still.target_box_ct));
+  EXPECT_GE(displacement_mm, 2.0);
+  const std::string key = "displacement_mm = ";
+  EXPECT_NEAR(std::stod(text.substr(text.find(key) + key.size())), displacement_mm, 1e-6);
+  EXPECT_NE(text.find("name = \"T12\""), std::string::npos);
+  EXPECT_NE(moved.note.find("T12 turned by "), std::string::npos) << moved.note;
+  EXPECT_NE(read_text_file(scratch_ / "moved" / "provenance.json").find("T12 turned by "),
+            std::string::npos);
+  // The pins' gold pose is the bone's.
+  std::vector<FiducialView> views;
+  for (const StudyView& view : moved.views)
+    views.push_back({rig_.camera(view.camera), view.fiducials_px});
+  // 0.2 px are 0.33 mm at the isocentre: as above, five standard errors.
+  EXPECT_LT((gold_from_fiducials(views, moved.fiducials_ct_mm).room_from_ct * moved.center_ct_mm -
+             *moved.gold_room_from_ct * moved.center_ct_mm)
+                .norm(),
+            1.4);
+}
+
+TEST_F(MovedT12, IsInTheXraysWhereItsPoseSaysAndPinsAreWithIt) {
+  // Discs and ribs where the bone was, and bodies before it, make the rest of the difference.
+  constexpr double kLowest = 0.8;
+  constexpr double kHighestOfAFlippedMotion = 0.4;
+  const StudyCase& still = simulated("--ideal --no-fiducials", "still");
+  const StudyCase& moved = simulated("--ideal --no-fiducials --moved-bone T12", "moved");
+  const StudyCase& pinned = simulated("--ideal --moved-bone T12", "pinned");
+  const RigidTransform& rest = *still.gold_room_from_ct;
+  const RigidTransform& gold = *moved.gold_room_from_ct;
+  for (std::size_t i = 0; i < 2; ++i) {
+    const CameraGeometry& camera = rig_.cameras[i];
+    const Eigen::ArrayXd difference =
+        attenuation_of(moved.views[i]) - attenuation_of(still.views[i]);
+    const Eigen::ArrayXd before = shadow_of("T12", camera, rest);
+    EXPECT_GT(correlation(shadow_of("T12", camera, gold) - before, difference), kLowest);
+    EXPECT_LT(
+        correlation(shadow_of("T12", camera, rest * gold.inverse() * rest) - before, difference),
+        kHighestOfAFlippedMotion);
+    const Eigen::ArrayXd pins = attenuation_of(pinned.views[i]) - attenuation_of(moved.views[i]);
+    for (const Eigen::Vector2d& pixel : pinned.views[i].fiducials_px) {
+      double darkest = 0.0;  // a pin may pass between the centres of pixels
+      for (const int down : {-1, 0, 1})
+        for (const int right : {-1, 0, 1})
+          darkest = std::max(
+              darkest,
+              pins[static_cast<int>(std::lround(pixel.x())) + right +
+                   camera.size_px.x() * (static_cast<int>(std::lround(pixel.y())) + down)]);
+      EXPECT_GT(darkest, 0.1) << pixel.transpose();
+    }
+  }
+}
+
+TEST_F(MovedT12, WithEveryStressDependsOnTheSeedButNotOnThreads) {
+  simulated("--moved-bone L1 --stress all --threads 1", "one");
+  simulated("--moved-bone L1 --stress all --threads 3", "three");
+  for (const char* name :
+       {"front.mha", "side.mha", "study.toml", "truth.toml", "ct.nii.gz", "rig-true.toml"})
+    EXPECT_EQ(read_text_file(scratch_ / "one" / name), read_text_file(scratch_ / "three" / name))
+        << name;
+}
+
+TEST_F(MovedT12, IsAlsoOfOneViewAndOfTheTypicalAdult) {
+  rig_.cameras.pop_back();
+  write_text_file(scratch_ / "rig.toml", rig_to_toml(rig_));
+  EXPECT_EQ(simulated("--moved-bone T9", "one-view").views.size(), 1u);
+  arguments_.replace(arguments_.find("--anatomy-seed 7"), 16, "");
+  EXPECT_NE(simulated("--moved-bone T12", "typical").note.find("bodies themselves"),
+            std::string::npos);
 }
 
 TEST_F(AfSimulate, DicomXaStatesTheCameraThatTookIt) {

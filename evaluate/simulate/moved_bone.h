@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+// A bone that X-rays show at another place among the rest than the CT does.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+#include "evaluate/simulate/phantom_parts.h"
+#include "geometry/rigid_transform.h"
+
+namespace af {
+
+/// Where a bone's points, as the CT has them, are among the rest (both ct, mm): turned by 2 to 5
+/// degrees about an axis through `center_ct_mm`, which is moved by 2 to 6 mm, both uniform. Of 64
+/// drawn pairs of directions, the one that takes least of the bone into other bone, metal or air.
+/// Keyed by (seed, key). The mean displacement over a box centred there is at least the centre's.
+/// \test MovedBone.TurnsAndShiftsByWhatIsStated
+RigidTransform drawn_rest_from_bone(const Phantom& phantom,
+                                    std::string_view bone,
+                                    const Eigen::Vector3d& center_ct_mm,
+                                    std::uint64_t seed,
+                                    std::uint64_t key);
+
+/// The phantom with the bodies of one bone moved. What else is there (other bones, discs, a socket)
+/// stays, and shows where the bone was; elsewhere muscle does. \test
+/// EveryMovedBone.LeavesSoftTissueWhereItWas
+Phantom with_moved_bone(Phantom phantom,
+                        std::string_view bone,
+                        const RigidTransform& rest_from_bone);
+
+}  // namespace af
