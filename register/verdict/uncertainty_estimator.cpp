@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "register/problem/pose_target.h"
+#include "register/problem/target_region.h"
 #include "register/verdict/calibration.h"
 #include "register/verdict/pose_covariance.h"
 #include "register/verdict/pose_information.h"
@@ -52,7 +53,6 @@ UncertaintyEstimator::UncertaintyEstimator(std::shared_ptr<const RegistrationPro
                                            const std::shared_ptr<ThreadPool>& pool)
     : problem_(std::move(problem)), options_(options) {
   if (options_.is_left_out) return;
-  for (const RegistrationView& view : problem_->views) views_.push_back(view.view);
   std::vector<StageOptions> ends;
   for (const ChainOptions& chain : method.chains) {
     const bool ends_with_finish = !method.finish.stages.empty();
@@ -75,10 +75,11 @@ double UncertaintyEstimator::add_covariance(const RegistrationResult& result,
                                             std::span<const ViewValue> view_values,
                                             UncertaintyReport& report) {
   const PoseFrame frame = PoseFrame::about(result.room_from_ct, problem_->center_ct_mm);
+  const std::vector<View> views = views_at(*problem_, result.room_from_ct);
   const auto basis = projected_motion_basis(result.room_from_ct,
                                             problem_->center_ct_mm,
                                             problem_->scaling_points_ct,
-                                            views_,
+                                            views,
                                             problem_->isocenter_point);
   if (!basis.has_value()) return UncertaintyReport::kNone;
   const std::size_t stage = stage_of_chain_.at(result.chain);
@@ -88,7 +89,7 @@ double UncertaintyEstimator::add_covariance(const RegistrationResult& result,
     return value.in_silhouette == in_silhouette;
   };
   if (!std::ranges::all_of(view_values, is_of_the_stage)) return UncertaintyReport::kNone;
-  if (!ends_[stage].narrow_to(*problem_, result.room_from_ct)) return UncertaintyReport::kNone;
+  if (!ends_[stage].place_at(*problem_, result.room_from_ct)) return UncertaintyReport::kNone;
   const auto information = information_at(ends_[stage].objective, frame, *basis, kTiles);
   if (!information.has_value()) return UncertaintyReport::kNone;
   const auto sandwich = sandwich_covariance(*information);
@@ -98,7 +99,7 @@ double UncertaintyEstimator::add_covariance(const RegistrationResult& result,
   report.inflation = inflation.pose;
   report.tre_inflation = inflation.tre;
   const PoseMatrix by_cameras = calibration_covariance(
-      *information, views_, problem_->isocenter_point, options_.calibration_error_px);
+      *information, views, problem_->isocenter_point, options_.calibration_error_px);
   report.covariance_deg_mm = in_deg_mm(inflation.pose * *sandwich + by_cameras);
   if (problem_->target_points_ct.empty()) return UncertaintyReport::kNone;
   const PredictedTre tre =
