@@ -55,6 +55,7 @@ std::string_view name_of_option(std::string_view option) {
                                         {"no-uncertainty", "no_uncertainty"},
                                         {"optimizer", "optimizer"},
                                         {"preset", "preset"},
+                                        {"region", "region"},
                                         {"renderer", "renderer"},
                                         {"scatter-to-primary", "scatter_to_primary"},
                                         {"seed", "seed"},

@@ -36,6 +36,7 @@ registration::MethodOptions method_options(const RegistrationOptions& options) {
   method.similarity = options.similarity;
   method.optimizer = options.optimizer;
   method.max_evaluations = options.max_evaluations;
+  method.region = options.region;
   method.seed = options.seed;
   method.threads = options.threads;
   return method;
@@ -92,6 +93,7 @@ registration::CaseLoadOptions load_options(const RegistrationOptions& options,
   af::throw_if_any(problems(result.ray_caster));
   result.skip_ct_check = options.skip_ct_check;
   result.fiducial_mask_mm = method_options(options).fiducial_mask_mm;
+  result.region_follows_target = method.region_follows_target;
   result.coarsest_level = method.coarsest_level();
   result.judging_level = registration::PoseExaminer::coarsest_level();
   if (options.correct) result.correction_levels = method.last_levels();

@@ -11,6 +11,7 @@
 #include "ct/ct_facts.h"
 #include "drr/field_level.h"
 #include "drr/opened_field.h"
+#include "files/csv_table.h"
 #include "files/sha256.h"
 #include "geometry/camera_distance.h"
 #include "ranks/root_only.h"
@@ -19,6 +20,7 @@
 #include "register/method/prepared_stage.h"
 #include "register/problem/fiducial_mask.h"
 #include "register/problem/pose_target.h"
+#include "register/problem/target_region.h"
 #include "study/ct_keys.h"
 #include "study/node_ct.h"
 #include "study/rig_file.h"
@@ -344,6 +346,30 @@ CtFacts read_facts(const StudyCase& study_case,
       study_case.places, "ct", [&] { return std::move(facts).share().take(); });
 }
 
+/// Lets the views' regions follow the target box. One that lies partly behind a source leaves the
+/// region of that view in its place.
+void follow_target(const StudyCase& study_case,
+                   RegistrationProblem& problem,
+                   std::vector<std::string>& warnings) {
+  for (std::size_t i = 0; i < problem.views.size(); ++i) {
+    RegistrationView& view = problem.views[i];
+    const CameraGeometry& camera = view.view.camera;
+    const auto box = projected_box(study_case.target_box_ct, problem.nominal_room_from_ct, camera);
+    if (!box.has_value()) continue;
+    std::optional<RegionOfInterest> stated;
+    if (study_case.views[i].is_roi_stated) stated = view.view.roi;
+    view.target_region = target_region_about(*box, stated, study_case.is_nominal_stated);
+    const Eigen::Vector2d size_px = box->high_px - box->low_px;
+    if ((size_px.array() > camera.size_px.array().cast<double>()).any())
+      warnings.push_back(
+          "target_box_ct_mm: at the nominal pose the target box is wider or higher "
+          "than the beam of camera '" +
+          camera.name + "': " + fixed_text(size_px.x(), 0) + " x " + fixed_text(size_px.y(), 0) +
+          " pixels of " + std::to_string(camera.size_px.x()) + " x " +
+          std::to_string(camera.size_px.y()) + "; what lies beyond the detector is not compared");
+  }
+}
+
 }  // namespace
 
 const char* to_string(RendererKind kind) {
@@ -367,7 +393,9 @@ LoadedCase load_case(const Study& study,
   });
   problem->views = read_views(study, study_case, options.fiducial_mask_mm, communicator, loaded);
 
+  problem->target_box_ct = study_case.target_box_ct;
   problem->target_points_ct = ct_lattice_points(study_case.target_box_ct, kTargetPointsPerAxis);
+  if (options.region_follows_target) follow_target(study_case, *problem, loaded.warnings);
   const bool looks_up = options.renderer == RendererKind::Field;
   std::optional<CtFacts> ct;
   CastVolumes volumes;

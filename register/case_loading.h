@@ -44,6 +44,7 @@ struct CaseLoadOptions {
   /// Radius, mm on the isocentre plane, of the discs about the study's fiducials that registration
   /// does not see; 0: it sees them.
   double fiducial_mask_mm = 0.0;
+  bool region_follows_target = true;  ///< RegistrationOptions::region_follows_target
   int coarsest_level = 0;  ///< of the image pyramids: RegistrationOptions::coarsest_level()
   /// Level that the verdict needs: PoseExaminer::coarsest_level(). Fields of few nodes have fewer.
   int judging_level = 0;

@@ -115,6 +115,7 @@ LoadedCase load_problem(const RegisterOptions& options,
                         const Communicator& world) {
   CaseLoadOptions load = case_load_options(options, method.coarsest_level(), method.last_levels());
   load.judging_level = PoseExaminer::coarsest_level();
+  load.region_follows_target = method.region_follows_target;
   load.pool = pool;
   const WorkNote note("loading case " + registered.of.name, WorkNote::Kind::Phase);
   LoadedCase loaded = load_case(registered.study, registered.of, load, world);

@@ -258,6 +258,7 @@ StudyView read_view(const toml::table& table,
   view.xray = path("xray", Presence::Required).value_or(fs::path());
   view.xray_domain = get_xray_domain(reader);
   view.roi = get_roi(reader, camera);
+  view.is_roi_stated = reader.has("roi_px");
   view.fiducials_px = get_points<2>(reader, "fiducials_px", RowGaps::Allowed);
   view.field = path("field", Presence::Optional);
   view.reading = read_xray_keys(
@@ -355,6 +356,8 @@ StudyCase read_case(const toml::table& table,
       reader.get_vector<3>("center_ct_mm", Presence::Required).value_or(Eigen::Vector3d::Zero());
   study_case.nominal_room_from_ct = reader.get_pose("nominal_room_from_ct", Presence::Optional)
                                         .value_or(pose_at_isocenter(context.rig, study_case));
+  study_case.is_nominal_stated =
+      reader.has("nominal_room_from_ct") || !study_case.landmarks_ct_mm.empty();
   study_case.target_box_ct = get_target_box(reader, study_case.places);
   study_case.fiducials_ct_mm = get_points<3>(reader, "fiducials_ct_mm");
   if (!study_case.fiducials_ct_mm.empty() && are_collinear(study_case.fiducials_ct_mm))
@@ -430,8 +433,9 @@ std::string view_text(const StudyView& view, const fs::path& folder) {
   add_path("xray", view.xray);
   text += view.xray_domain == XrayDomain::Intensity ? "xray_domain = \"intensity\"\n"
                                                     : "xray_domain = \"attenuation\"\n";
-  text += "roi_px = [" + std::to_string(view.roi.column) + ", " + std::to_string(view.roi.row) +
-          ", " + std::to_string(view.roi.width) + ", " + std::to_string(view.roi.height) + "]\n";
+  if (view.is_roi_stated)
+    text += "roi_px = [" + std::to_string(view.roi.column) + ", " + std::to_string(view.roi.row) +
+            ", " + std::to_string(view.roi.width) + ", " + std::to_string(view.roi.height) + "]\n";
   if (!view.fiducials_px.empty()) text += "fiducials_px = " + points_text(view.fiducials_px) + "\n";
   if (!view.landmarks_px.empty())
     text +=
@@ -451,7 +455,9 @@ std::string case_text(const StudyCase& study_case, const CameraRig& rig, const f
   if (!study_case.note.empty()) text += "note = " + toml_text(study_case.note) + "\n";
   text += "ct = " + toml_text(relative_if_below(study_case.ct, folder)) + "\n";
   text += ct_keys_text(study_case.ct_reading);
-  text += "nominal_room_from_ct = " + toml_matrix(study_case.nominal_room_from_ct.matrix()) + "\n";
+  if (study_case.is_nominal_stated)
+    text +=
+        "nominal_room_from_ct = " + toml_matrix(study_case.nominal_room_from_ct.matrix()) + "\n";
   text += "center_ct_mm = " + toml_numbers(study_case.center_ct_mm) + "\n";
   text += "target_box_ct_mm = [" + toml_numbers(study_case.target_box_ct.low_mm) + ", " +
           toml_numbers(study_case.target_box_ct.high_mm) + "]\n";

@@ -29,6 +29,7 @@ struct StudyView {
   std::filesystem::path xray;
   XrayDomain xray_domain = XrayDomain::Intensity;
   RegionOfInterest roi;
+  bool is_roi_stated = true;  ///< else it is the whole detector
   /// (column, row) of the undistorted X-ray, in the order of StudyCase::fiducials_ct_mm; NaN: not
   /// seen.
   std::vector<Eigen::Vector2d> fiducials_px;
@@ -41,8 +42,17 @@ struct StudyView {
   StudyPlaces places;
 
   auto members() {
-    return std::tie(
-        camera, xray, xray_domain, roi, fiducials_px, landmarks_px, field, mask, reading, places);
+    return std::tie(camera,
+                    xray,
+                    xray_domain,
+                    roi,
+                    is_roi_stated,
+                    fiducials_px,
+                    landmarks_px,
+                    field,
+                    mask,
+                    reading,
+                    places);
   }
 };
 
@@ -53,6 +63,8 @@ struct StudyCase {
   std::filesystem::path ct;  ///< image file or DICOM folder
   CtReadOptions ct_reading;  ///< keys ct_values, ct_resample, ...
   RigidTransform nominal_room_from_ct = RigidTransform::Identity();
+  /// By a pose or by landmarks; else it is the one that puts center_ct_mm at the isocentre.
+  bool is_nominal_stated = true;
   Eigen::Vector3d center_ct_mm =
       Eigen::Vector3d::Zero();  ///< ROI centre: rotation origin of the registration
   CtBox target_box_ct;
@@ -69,6 +81,7 @@ struct StudyCase {
                     ct,
                     ct_reading,
                     nominal_room_from_ct,
+                    is_nominal_stated,
                     center_ct_mm,
                     target_box_ct,
                     fiducials_ct_mm,

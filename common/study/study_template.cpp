@@ -49,7 +49,7 @@ target_box_ct_mm = [[-30, -30, -30], [30, 30, 30]]  # low and high corner: TRE i
 camera = "A"                                     # a camera of the rig
 xray = "patient-01/A.mha"                        # DICOM, MetaImage, NIfTI, NRRD, TIFF or PNG, the camera's size
 xray_domain = "intensity"                        # bright = unattenuated, -log is taken; or "attenuation"
-roi_px = [156, 156, 200, 200]                    # column, row, width, height: what is compared; else all
+roi_px = [156, 156, 200, 200]                    # column, row, width, height: what is compared; else about the target box
 # fiducials_px = [[201.3, 255.0], [280.1, 231.7], [240.6, 301.2], [232.9, 207.4]]   # as many as fiducials_ct_mm
 # landmarks_px = [[210.0, 240.5], [], [251.0, 330.0]]   # as many as landmarks_ct_mm; [] is one that is not visible
 # field = "fields/patient-01-A.af.h5"            # made by af-precompute --study study.toml --case patient-01 --camera A

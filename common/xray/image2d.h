@@ -17,6 +17,7 @@ struct RegionOfInterest {
   int height = 0;
 
   auto members() { return std::tie(column, row, width, height); }
+  bool operator==(const RegionOfInterest&) const = default;
   [[nodiscard]] std::size_t pixel_count() const {
     return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   }

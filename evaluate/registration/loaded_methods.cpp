@@ -63,6 +63,7 @@ std::vector<LoadedMethod> load_methods(
     // Both renderers, so that ends compare.
     loading.ray_caster.step_mm = correction.cast_step_mm(options.ray_caster.step_mm);
     loading.judging_level = judging_level;
+    loading.region_follows_target = method.region_follows_target;
     loading.pool = pool;
     if (renderer == "field") loading.kept_fields = kept_fields;
     const registration::LoadedCase loaded =

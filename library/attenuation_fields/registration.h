@@ -37,9 +37,10 @@ struct RegistrationOptions {
   std::optional<std::string> similarity = {};  ///< of every stage
   std::optional<std::string> optimizer = {};   ///< of every stage
   std::optional<int> max_evaluations = {};
-  bool correct = false;             ///< corrects the end by ray casting
-  bool skip_ct_check = false;       ///< with fields: the CT is not read
-  double water_mu_per_mm = 0.0200;  ///< of ray casting
+  std::optional<std::string> region = {};  ///< "target" or "study"
+  bool correct = false;                    ///< corrects the end by ray casting
+  bool skip_ct_check = false;              ///< with fields: the CT is not read
+  double water_mu_per_mm = 0.0200;         ///< of ray casting
   int air_below_hu = -900;
   double step_mm = 1.0;
   std::uint64_t seed = 1;

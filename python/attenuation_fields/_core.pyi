@@ -250,6 +250,7 @@ class RegistrationCase:
         similarity: Optional[str] = ...,
         optimizer: Optional[str] = ...,
         max_evaluations: Optional[int] = ...,
+        region: Optional[str] = ...,
         correct: bool = ...,
         skip_ct_check: bool = ...,
         water_mu_per_mm: float = ...,

@@ -9,6 +9,9 @@
 namespace af::registration {
 namespace {
 
+constexpr const char* kRegionOfTarget = "target";
+constexpr const char* kRegionOfStudy = "study";
+
 /// The chain of a finish or a judge, which cannot depend on other chains.
 ChainOptions unconditional_chain(const std::string& name, const std::string& text) {
   ChainOptions chain = chain_from_text(name, text);
@@ -91,6 +94,13 @@ void MethodOptions::describe(Fields& field) {
   field.start_group("Method");
   describe_chains(field, *this);
   field("max_evaluations", max_evaluations, "Most poses tried per registration (default: 5000)");
+  field(
+      "region",
+      region,
+      "Where X-rays are compared: target: each view's region goes where the target box is seen, "
+      "at the start of every stage and wherever an end is judged; study: it stays where roi_px of "
+      "the study puts it (default: target; study with --preset paper)")
+      .choice({kRegionOfTarget, kRegionOfStudy});
   field("fiducial_mask_mm",
         fiducial_mask_mm,
         "Radius of the discs about the study's fiducials that registration does not see, mm on the "
@@ -121,6 +131,7 @@ RegistrationOptions resolve(const MethodOptions& options) {
     if (options.smoothing_sigma_mm.has_value() && !chain.stages.empty())
       chain.stages.front().smoothing_sigma_mm = *options.smoothing_sigma_mm;
   if (options.max_evaluations.has_value()) result.max_evaluations = *options.max_evaluations;
+  if (options.region.has_value()) result.region_follows_target = *options.region == kRegionOfTarget;
   result.seed = options.seed;
   std::vector<std::string> found = problems(result);
   if (options.judge_enough_value.has_value() && result.chains.size() < 2)
@@ -137,6 +148,7 @@ MethodOptions MethodOptions::in_force() const {
   MethodOptions options;
   options.preset = preset_name();
   options.max_evaluations = resolved.max_evaluations;
+  options.region = resolved.region_follows_target ? kRegionOfTarget : kRegionOfStudy;
   options.seed = seed;
   options.threads = threads;
   options.fiducial_mask_mm = fiducial_mask_mm;

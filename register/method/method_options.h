@@ -21,6 +21,7 @@ struct MethodOptions {
   std::optional<std::string> optimizer;      ///< of every stage
   std::optional<double> smoothing_sigma_mm;  ///< of each chain's first stage
   std::optional<int> max_evaluations;
+  std::optional<std::string> region;  ///< "target": it follows the target; "study": it stays
   /// Radius, mm on the isocentre plane, of the discs about fiducials that registration does not
   /// see.
   double fiducial_mask_mm = 4.0;

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "register/problem/target_region.h"
 #include "xray/gaussian_blur.h"
 
 namespace af::registration {
@@ -107,52 +108,40 @@ std::shared_ptr<const DrrRenderer> stage_renderer(const RegistrationView& view, 
                     : view.coarse_levels[static_cast<std::size_t>(level) - 1].renderer;
 }
 
+/// Of a pose at which a stage cannot be placed.
+constexpr ObjectiveValue kNoValue{.similarity = std::numeric_limits<double>::quiet_NaN()};
+
 /// Markers are hidden only in stages of at least this many pixels, and if three quarters stay
 /// visible: in a small region nearly all coarse pixels may touch a marker.
 constexpr std::size_t kLeastPixelsToHideIn = 400;
 
-/// The X-ray of a stage with the markers hidden, if that leaves enough of it.
-SimilarityReference visible_reference(const RegistrationView& view, const StageGrid& grid) {
-  SimilarityReference reference = stage_reference(view.xray, view.mask, view.view, grid);
-  if (view.mask_without_markers.pixels.empty()) return reference;
-  std::vector<std::uint8_t> hidden =
-      used_blocks(view.mask_without_markers, grid.pixel_step, scaled_region(view.view, grid));
-  const auto used = static_cast<std::size_t>(std::count(hidden.begin(), hidden.end(), 1));
-  const std::size_t pixels = hidden.size();
-  if (pixels >= kLeastPixelsToHideIn && 4 * used >= 3 * pixels) reference.used = std::move(hidden);
+/// The X-ray with the markers hidden (`visible`: stage pixels without markers; empty: no markers),
+/// if that leaves enough of it.
+SimilarityReference without_markers(SimilarityReference reference,
+                                    std::vector<std::uint8_t> visible) {
+  const auto used = static_cast<std::size_t>(std::count(visible.begin(), visible.end(), 1));
+  const std::size_t pixels = visible.size();
+  if (pixels >= kLeastPixelsToHideIn && 4 * used >= 3 * pixels) reference.used = std::move(visible);
   return reference;
 }
 
-/// The X-ray as a stage compares it with DRRs; InputError when nothing can be compared with it.
-SimilarityReference prepare_reference(const RegistrationView& view,
-                                      const ValueRange& drr_range,
-                                      const StageGrid& grid) {
-  SimilarityReference reference = visible_reference(view, grid);
-  reference.drr_range = drr_range;
-  std::vector<std::string> found = problems(reference);
-  for (std::string& text : found) text.insert(0, view_name(view));
-  throw_if_any(found);
-  return reference;
-}
-
-/// A view as several stages see it: most of a method's stages share their grids.
-class SeenView {
- public:
-  SeenView(const RegistrationProblem& problem, const RegistrationView& view)
-      : view_(view), drr_range_(view.drr_range ? *view.drr_range : drr_range_of(problem, view)) {}
-
-  [[nodiscard]] const RegistrationView& view() const { return view_; }
-  const SimilarityReference& reference(const StageGrid& grid) {
-    for (const auto& [known, reference] : references_)
-      if (known == grid) return reference;
-    return references_.emplace_back(grid, prepare_reference(view_, drr_range_, grid)).second;
+/// A region's part of values of a whole image; empty when they are.
+std::vector<std::uint8_t> part_of(const std::vector<std::uint8_t>& values,
+                                  int width,
+                                  const RegionOfInterest& region) {
+  std::vector<std::uint8_t> part;
+  if (values.empty()) return part;
+  for (int row = region.row; row < region.row + region.height; ++row) {
+    const auto first = values.begin() + static_cast<std::ptrdiff_t>(row) * width + region.column;
+    part.insert(part.end(), first, first + region.width);
   }
+  return part;
+}
 
- private:
-  const RegistrationView& view_;
-  ValueRange drr_range_;
-  std::list<std::pair<StageGrid, SimilarityReference>> references_;
-};
+/// The corner of the detector's first whole stage pixel where a region's lie on the same grid.
+Eigen::Vector2i first_corner(const RegionOfInterest& region, int step) {
+  return {region.column % step, region.row % step};
+}
 
 SimilarityOptions similarity_of(const StageOptions& stage) {
   SimilarityOptions similarity = stage.similarity;
@@ -161,15 +150,97 @@ SimilarityOptions similarity_of(const StageOptions& stage) {
   return similarity;
 }
 
-ObjectiveView prepare_view(const RegistrationView& view,
-                           const SimilarityReference& reference,
-                           const StageGrid& grid,
-                           const StageOptions& stage) {
-  return {stage_view(view.view, grid),
-          stage_renderer(view, stage.level),
-          make_similarity(similarity_of(stage), reference),
-          view.limit};
-}
+}  // namespace
+
+/// A view as several stages see it: most of a method's stages share their grids.
+class SeenView {
+ public:
+  SeenView(const RegistrationProblem& problem, const RegistrationView& view)
+      : view_(view),
+        nominal_region_(region_at(problem, view, problem.nominal_room_from_ct)),
+        drr_range_(view.drr_range ? *view.drr_range : drr_range_of(problem, view)) {}
+
+  [[nodiscard]] const RegistrationView& view() const { return view_; }
+
+  /// The X-ray of a region as a stage compares it with DRRs; InputError when nothing can be
+  /// compared with it.
+  SimilarityReference reference(const StageGrid& grid, const RegionOfInterest& region) {
+    if (region != nominal_region_) return checked(elsewhere(grid, region));
+    for (const auto& [known, reference] : references_)
+      if (known == grid) return reference;
+    return references_.emplace_back(grid, checked(seen({view_.view.camera, region}, grid))).second;
+  }
+
+ private:
+  /// The whole detector in the stage pixels of a grid, from which moved regions are cut out.
+  struct Detector {
+    StageGrid grid;
+    Eigen::Vector2i first;  ///< see first_corner()
+    SimilarityReference seen;
+    std::vector<std::uint8_t> visible;  ///< see without_markers()
+  };
+
+  [[nodiscard]] std::vector<std::uint8_t> visible(const RegionOfInterest& region, int step) const {
+    const Image2d& mask = view_.mask_without_markers;
+    return mask.pixels.empty() ? std::vector<std::uint8_t>() : used_blocks(mask, step, region);
+  }
+
+  [[nodiscard]] SimilarityReference seen(const View& view, const StageGrid& grid) const {
+    return without_markers(stage_reference(view_.xray, view_.mask, view, grid),
+                           visible(scaled_region(view, grid), grid.pixel_step));
+  }
+
+  /// As seen(), but cut out of the whole detector, which is kept, where the stage pixels lie as
+  /// they do at the nominal pose; else the region has been cut at the detector's edge.
+  SimilarityReference elsewhere(const StageGrid& grid, const RegionOfInterest& region) {
+    const CameraGeometry& camera = view_.view.camera;
+    const int step = grid.pixel_step;
+    const RegionOfInterest stage_region = scaled_region({camera, region}, grid);
+    const Eigen::Vector2i first = first_corner(stage_region, step);
+    if (first != first_corner(scaled_region({camera, nominal_region_}, grid), step))
+      return seen({camera, region}, grid);
+    const Detector& whole = detector(grid, first);
+    const RegionOfInterest part = {stage_region.column / step,
+                                   stage_region.row / step,
+                                   stage_region.width / step,
+                                   stage_region.height / step};
+    const int width = whole.seen.xray.width;
+    SimilarityReference reference;
+    reference.xray = crop(whole.seen.xray, part);
+    reference.used = part_of(whole.seen.used, width, part);
+    return without_markers(std::move(reference), part_of(whole.visible, width, part));
+  }
+
+  const Detector& detector(const StageGrid& grid, const Eigen::Vector2i& first) {
+    for (const Detector& known : detectors_)
+      if (known.grid == grid) return known;
+    const int step = grid.pixel_step;
+    const CameraGeometry& camera = view_.view.camera;
+    const Eigen::Vector2i size_px = (camera.size_px - first) / step * step;
+    const RegionOfInterest all = {first.x(), first.y(), size_px.x(), size_px.y()};
+    return detectors_.emplace_back(Detector{
+        grid,
+        first,
+        stage_reference(view_.xray, view_.mask, {camera, all}, {step, 1.0, grid.blur_sigma_px}),
+        visible(all, step)});
+  }
+
+  [[nodiscard]] SimilarityReference checked(SimilarityReference reference) const {
+    reference.drr_range = drr_range_;
+    std::vector<std::string> found = problems(reference);
+    for (std::string& text : found) text.insert(0, view_name(view_));
+    throw_if_any(found);
+    return reference;
+  }
+
+  const RegistrationView& view_;
+  RegionOfInterest nominal_region_;
+  ValueRange drr_range_;
+  std::list<std::pair<StageGrid, SimilarityReference>> references_;  ///< at the nominal pose
+  std::list<Detector> detectors_;  ///< made when a region first moves
+};
+
+namespace {
 
 SilhouetteView silhouette_view(const RegistrationProblem& problem,
                                const RegistrationView& view,
@@ -182,22 +253,40 @@ SilhouetteView silhouette_view(const RegistrationProblem& problem,
   return {whole, reference, similarity_of(stage), view.renderer, margin_px};
 }
 
-PreparedStage prepared_stage(const RegistrationProblem& problem,
-                             const StageOptions& stage,
-                             std::span<SeenView> views,
-                             const std::shared_ptr<ThreadPool>& pool) {
+std::vector<RegionOfInterest> regions_at(const RegistrationProblem& problem,
+                                         std::span<const std::shared_ptr<SeenView>> views,
+                                         const RigidTransform& room_from_ct,
+                                         int step_px) {
+  std::vector<RegionOfInterest> regions;
+  regions.reserve(views.size());
+  for (const std::shared_ptr<SeenView>& seen : views)
+    regions.push_back(region_at(problem, seen->view(), room_from_ct, step_px));
+  return regions;
+}
+
+/// A stage that looks at these regions, not yet narrowed to silhouettes.
+PreparedStage stage_over(const RegistrationProblem& problem,
+                         const StageOptions& stage,
+                         const std::vector<std::shared_ptr<SeenView>>& views,
+                         std::vector<RegionOfInterest> regions,
+                         const std::shared_ptr<ThreadPool>& pool) {
   std::vector<ObjectiveView> whole;
   std::vector<SilhouetteView> silhouettes;
-  for (SeenView& seen : views) {
-    const RegistrationView& view = seen.view();
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const RegistrationView& view = views[i]->view();
     const StageGrid grid = stage_grid(problem, view, stage);
-    const SimilarityReference& reference = seen.reference(grid);
-    whole.push_back(prepare_view(view, reference, grid, stage));
+    const SimilarityReference reference = views[i]->reference(grid, regions[i]);
+    whole.push_back({stage_view({view.view.camera, regions[i]}, grid),
+                     stage_renderer(view, stage.level),
+                     make_similarity(similarity_of(stage), reference),
+                     view.limit});
     if (stage.silhouette_mm > 0.0)
       silhouettes.push_back(silhouette_view(problem, view, whole.back(), reference, stage));
   }
   return {stage,
           &known_optimizer(stage.optimizer),
+          views,
+          std::move(regions),
           MultiViewObjective(std::move(whole), pool),
           std::move(silhouettes)};
 }
@@ -251,6 +340,29 @@ SimilarityReference stage_reference(const Image2d& xray,
   return reference;
 }
 
+bool PreparedStage::would_move(const RegistrationProblem& problem,
+                               const RigidTransform& room_from_ct) const {
+  if (!silhouettes.empty()) return true;
+  for (std::size_t i = 0; i < views.size(); ++i)
+    if (region_at(problem, views[i]->view(), room_from_ct, options.pixel_step) != regions[i])
+      return true;
+  return false;
+}
+
+bool PreparedStage::place_at(const RegistrationProblem& problem,
+                             const RigidTransform& room_from_ct) {
+  if (!would_move(problem, room_from_ct)) return true;
+  std::vector<RegionOfInterest> there =
+      regions_at(problem, views, room_from_ct, options.pixel_step);
+  try {
+    if (there != regions)
+      *this = stage_over(problem, options, views, std::move(there), objective.pool());
+  } catch (const InputError&) {  // an X-ray without contrast there
+    return false;
+  }
+  return narrow_to(problem, room_from_ct);
+}
+
 bool PreparedStage::narrow_to(const RegistrationProblem& problem,
                               const RigidTransform& room_from_ct) {
   if (silhouettes.empty()) return true;
@@ -263,10 +375,12 @@ bool PreparedStage::narrow_to(const RegistrationProblem& problem,
 
 ObjectiveValue PreparedStage::value_at(const RegistrationProblem& problem,
                                        const RigidTransform& room_from_ct) {
-  if (narrow_to(problem, room_from_ct)) return objective.evaluate(room_from_ct);
-  ObjectiveValue none;
-  none.similarity = std::numeric_limits<double>::quiet_NaN();
-  return none;
+  return place_at(problem, room_from_ct) ? objective.evaluate(room_from_ct) : kNoValue;
+}
+
+ObjectiveValue PreparedStage::value_in_place(const RegistrationProblem& problem,
+                                             const RigidTransform& room_from_ct) {
+  return narrow_to(problem, room_from_ct) ? objective.evaluate(room_from_ct) : kNoValue;
 }
 
 std::vector<PreparedStage> prepared_stages(const RegistrationProblem& problem,
@@ -281,12 +395,13 @@ std::vector<PreparedStage> prepared_stages(const RegistrationProblem& problem,
       throw InputError(view_name(view) +
                        "coarse_levels = " + std::to_string(view.coarse_levels.size()) +
                        ": the stages need " + std::to_string(coarsest));
-  std::vector<SeenView> seen;
-  seen.reserve(views.size());
-  for (const RegistrationView& view : views) seen.emplace_back(problem, view);
+  std::vector<std::shared_ptr<SeenView>> seen;
+  for (const RegistrationView& view : views)
+    seen.push_back(std::make_shared<SeenView>(problem, view));
   std::vector<PreparedStage> prepared;
   for (const StageOptions& stage : stages)
-    prepared.push_back(prepared_stage(problem, stage, seen, threads));
+    prepared.push_back(stage_over(
+        problem, stage, seen, regions_at(problem, seen, problem.nominal_room_from_ct, 1), threads));
   return prepared;
 }
 

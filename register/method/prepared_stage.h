@@ -36,30 +36,46 @@ SimilarityReference stage_reference(const Image2d& xray,
                                     const View& view,
                                     const StageGrid& grid);
 
-/// A stage of a chain with all that does not depend on where it starts: X-rays and regions as it
-/// sees them, its renderers and measures.
+class SeenView;
+
+/// A stage of a chain: X-rays and regions as it sees them, its renderers and measures. The problem
+/// outlives it. Call place_at() before a search: what the objective compares depends on that pose
+/// alone.
 struct PreparedStage {
   StageOptions options;
   const Optimizer* optimizer;
-  MultiViewObjective objective;  ///< narrowed to the silhouettes at the last pose, if any
+  std::vector<std::shared_ptr<SeenView>> views;
+  std::vector<RegionOfInterest> regions;  ///< where it looks, before roi_scale
+  MultiViewObjective objective;           ///< narrowed to the silhouettes at the last pose, if any
   std::vector<SilhouetteView> silhouettes;  ///< none where the whole region counts
 
+  /// Whether place_at() would change what the objective compares.
+  [[nodiscard]] bool would_move(const RegistrationProblem& problem,
+                                const RigidTransform& room_from_ct) const;
+  /// Lets the objective compare what is to be compared at a pose: puts the regions where the target
+  /// is seen there (region_at(), by whole stage pixels), then narrow_to(). False, with the regions
+  /// where they were, when X-rays show nothing there that could be compared.
+  /// \test PreparedStage.IsTheSameAgainWhereverItHasBeen
+  [[nodiscard]] bool place_at(const RegistrationProblem& problem,
+                              const RigidTransform& room_from_ct);
   /// Narrows the objective to the silhouettes at a pose, if the stage uses silhouettes; false when
   /// too little of them is visible.
   [[nodiscard]] bool narrow_to(const RegistrationProblem& problem,
                                const RigidTransform& room_from_ct);
-  /// The objective's value at a pose, within the silhouettes there; inadmissible when too little of
-  /// them is visible.
+  /// The objective's value at a pose, placed there; inadmissible where it cannot be.
   [[nodiscard]] ObjectiveValue value_at(const RegistrationProblem& problem,
                                         const RigidTransform& room_from_ct);
+  /// The same with the regions where they are, within the silhouettes at the pose.
+  [[nodiscard]] ObjectiveValue value_in_place(const RegistrationProblem& problem,
+                                              const RigidTransform& room_from_ct);
 };
 
 /// RegistrationView::drr_range of a view. InputError when its field does not hold the nominal pose.
 ValueRange drr_range_of(const RegistrationProblem& problem, const RegistrationView& view);
 
-/// The stages of a method, over some of the problem's views. InputError when the problem has
-/// problems or lacks their levels, when an X-ray has nothing that could be compared, and as
-/// drr_range_of().
+/// The stages of a method, over some of the problem's views, placed at the nominal pose. InputError
+/// when the problem has problems or lacks their levels, when an X-ray has nothing there that could
+/// be compared, and as drr_range_of().
 std::vector<PreparedStage> prepared_stages(const RegistrationProblem& problem,
                                            std::span<const RegistrationView> views,
                                            std::span<const StageOptions> stages,

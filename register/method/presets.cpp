@@ -26,7 +26,9 @@ RegistrationOptions paper_preset() {
   StageOptions sharp;
   sharp.search.initial_step_mm = 2.0;
   sharp.search.final_step_mm = 0.1;
-  return one_chain({"paper", {smoothed, sharp}});
+  RegistrationOptions options = one_chain({"paper", {smoothed, sharp}});
+  options.region_follows_target = false;
+  return options;
 }
 
 RegistrationOptions fast_preset() {

@@ -88,6 +88,8 @@ struct RegistrationOptions {
   JudgeOptions judge;          ///< of a portfolio; not used with one chain
   int max_evaluations = 5000;  ///< pose evaluations per registration, all chains together
   std::uint64_t seed = 1;      ///< of optimisers that draw random numbers
+  /// Whether problems are to be made with regions that follow the target (region_at()).
+  bool region_follows_target = true;
   CorrectionOptions correction;
 
   /// Replaces the measure, or the optimiser, of every stage.

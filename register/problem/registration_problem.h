@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "drr/drr_renderer.h"
+#include "geometry/ct_box.h"
 #include "geometry/ct_grid.h"
 #include "geometry/rigid_transform.h"
 #include "register/problem/multi_view_objective.h"
@@ -22,7 +23,10 @@ struct RendererLevel {
 
 /// One X-ray of the problem. Pixels are the camera's; nothing is cropped yet.
 struct RegistrationView {
-  View view;     ///< camera and region of interest
+  View view;  ///< camera and the study's region of interest
+  /// The region at the nominal pose, not cut at the detector's edges, that follows the target box
+  /// (region_at()); none: the region stays view.roi.
+  std::optional<RegionOfInterest> target_region;
   Image2d xray;  ///< whole detector, attenuation domain (bright = attenuated)
   Image2d mask;  ///< whole detector, non-zero = used; empty: every pixel of the region
   /// `mask` that also hides the gold standard's markers; empty: the same. Used in stages of 400
@@ -61,6 +65,7 @@ struct RegistrationProblem {
   Eigen::Vector3d isocenter_point = Eigen::Vector3d::Zero();  ///< room, mm
   std::vector<Eigen::Vector3d> scaling_points_ct;             ///< see ct_lattice_points()
   std::vector<RegistrationView> views;
+  std::optional<CtBox> target_box_ct;             ///< regions that follow it need it
   std::vector<Eigen::Vector3d> target_points_ct;  ///< of the target box; a correction needs them
   std::vector<Eigen::Vector3d> cut_points_ct;     ///< see cut_points(); silhouettes leave them out
   std::optional<CtGrid> ct_grid;                  ///< none where nobody looked at the CT

@@ -24,11 +24,6 @@ StageOptions silhouette_stage(double silhouette_mm) {
   return stage;
 }
 
-/// The squared correlation.
-double share_of(double correlation) {
-  return std::isfinite(correlation) ? std::pow(std::max(0.0, correlation), 2) : correlation;
-}
-
 /// Places in judging_stages().
 constexpr std::size_t kCoarse = 0;
 constexpr std::size_t kFine = 1;
@@ -59,12 +54,10 @@ std::optional<PoseExaminer::JudgedView> PoseExaminer::judged_view(
   }
 }
 
-double PoseExaminer::share_at(std::size_t stage,
-                              const RigidTransform& room_from_ct,
-                              JudgedView& view) const {
-  std::vector<PreparedStage>& stages = view.stages;
-  const double value = stages[stage].value_at(*problem_, room_from_ct).similarity;
-  return stages[stage].silhouettes.empty() ? value : share_of(value);
+double PoseExaminer::share_of(const ObjectiveValue& value) const {
+  const double correlation = value.similarity;
+  if (!in_silhouette_ || !std::isfinite(correlation)) return correlation;
+  return std::pow(std::max(0.0, correlation), 2);
 }
 
 double PoseExaminer::share_beside(const RigidTransform& room_from_ct,
@@ -76,7 +69,7 @@ double PoseExaminer::share_beside(const RigidTransform& room_from_ct,
     for (const double way_mm : {-mm, mm}) {
       const RigidTransform beside =
           pose_from_parameters(frame, {.translation_mm = way_mm * direction});
-      const double share = share_at(kFine, beside, view);
+      const double share = share_of(view.stages[kFine].value_in_place(*problem_, beside));
       if (std::isfinite(share)) shares.push_back(share);
     }
   return mean_of(shares);
@@ -99,8 +92,8 @@ std::vector<ViewValue> PoseExaminer::view_values(const RigidTransform& room_from
   for (std::optional<JudgedView>& view : views_) {
     ViewValue& value = values.emplace_back(ViewValue{kNone, kNone, in_silhouette_});
     if (!view) continue;
-    value.coarse = share_at(kCoarse, room_from_ct, *view);
-    value.fine = share_at(kFine, room_from_ct, *view);
+    value.coarse = share_of(view->stages[kCoarse].value_at(*problem_, room_from_ct));
+    value.fine = share_of(view->stages[kFine].value_at(*problem_, room_from_ct));
     if (!with_backgrounds) continue;
     for (const double part : {1.0, 0.5, 0.25}) {
       value.background = share_beside(room_from_ct, part * kBackgroundDistanceMm, *view);

@@ -41,12 +41,11 @@ class PoseExaminer {
   static std::optional<JudgedView> judged_view(const RegistrationProblem& problem,
                                                std::size_t view,
                                                double silhouette_mm);
-  /// The share of the X-ray's gradients that a pose explains to a stage.
-  [[nodiscard]] double share_at(std::size_t stage,
-                                const RigidTransform& room_from_ct,
-                                JudgedView& view) const;
-  /// Mean share in detail over the poses that the field holds of four `mm` beside one; NaN for
-  /// none.
+  /// The share of the X-ray's gradients that a stage's value says a pose explains: within
+  /// silhouettes a squared correlation.
+  [[nodiscard]] double share_of(const ObjectiveValue& value) const;
+  /// Mean share in detail over the poses that the field holds of four `mm` beside one, in whose
+  /// region the view has been judged; NaN for none.
   [[nodiscard]] double share_beside(const RigidTransform& room_from_ct,
                                     double mm,
                                     JudgedView& view) const;

@@ -13,6 +13,7 @@
 #include "geometry/tre.h"
 #include "register/optimizer/newton_search.h"
 #include "register/problem/pose_target.h"
+#include "register/problem/target_region.h"
 
 namespace af::registration {
 namespace {
@@ -85,11 +86,13 @@ ObjectiveValue value_of_judge(PreparedStage& judge,
 }
 
 std::optional<ParameterScaling> scaling_at(const RegistrationProblem& problem,
-                                           std::span<const View> views,
                                            const RigidTransform& room_from_ct,
                                            std::span<const Eigen::Vector3d> points_ct) {
-  return projected_motion_scaling(
-      room_from_ct, problem.center_ct_mm, points_ct, views, problem.isocenter_point);
+  return projected_motion_scaling(room_from_ct,
+                                  problem.center_ct_mm,
+                                  points_ct,
+                                  views_at(problem, room_from_ct),
+                                  problem.isocenter_point);
 }
 
 /// Differences over this many mm to both sides average over a field's nodes, yet are small beside
@@ -117,7 +120,6 @@ struct Run {
   const RegistrationOptions& options;
   std::vector<PreparedStage>& stages;
   std::optional<PreparedStage>& judge;
-  const std::vector<View>& views;
   OptimizerResult& search;  ///< of the stage that was searched last
   std::int64_t start_index = 0;
   RigidTransform start;                      ///< within the motion range
@@ -137,10 +139,10 @@ struct Run {
   /// Of the search that ended last, "" when it is not pinned.
   [[nodiscard]] std::string pinned_along(const PoseTarget& target,
                                          const PreparedStage& stage) const;
-  /// Narrows a stage to the silhouettes at its start; false, and why in `end`, when it cannot.
-  [[nodiscard]] bool narrow_at_start(PreparedStage& stage, ChainEnd& end);
+  /// Places a stage at its start; false, and why in `end`, when it cannot.
+  [[nodiscard]] bool place_at_start(PreparedStage& stage, ChainEnd& end);
   /// Makes the similarities of ends of several starts comparable: evaluates an end within its own
-  /// silhouettes and without reused images.
+  /// regions and silhouettes and without reused images.
   void take_own_similarity(ChainEnd& end);
   /// Runs the chains and judges their ends: those that have a value, the best one first.
   std::vector<PortfolioEnd> portfolio_ends();
@@ -183,7 +185,7 @@ struct Run {
 std::optional<ParameterScaling> Run::scaling_of(const PreparedStage& stage,
                                                 const RigidTransform& room_from_ct) const {
   return stage.optimizer->needs() == Derivatives::None
-             ? scaling_at(problem, views, room_from_ct, problem.scaling_points_ct)
+             ? scaling_at(problem, room_from_ct, problem.scaling_points_ct)
              : at_start;
 }
 
@@ -213,7 +215,7 @@ bool Run::run_stage(PreparedStage& stage, std::size_t index, ChainEnd& end) {
     end.stop_reason = StopReason::CtOutsideRoi;
     return false;
   }
-  if (!narrow_at_start(stage, end)) return false;
+  if (!place_at_start(stage, end)) return false;
   PoseTarget target(
       stage.objective, PoseFrame::about(end.room_from_ct, problem.center_ct_mm), *scaling);
   const SearchBudget budget{options.max_evaluations - result.evaluations, random_key(index)};
@@ -249,10 +251,10 @@ bool Run::run_chain(const ChainOptions& chain, std::size_t first, ChainEnd& end)
   return true;
 }
 
-bool Run::narrow_at_start(PreparedStage& stage, ChainEnd& end) {
-  if (stage.silhouettes.empty()) return true;
-  result.drr_count += static_cast<std::int64_t>(views.size());
-  if (stage.narrow_to(problem, end.room_from_ct)) return true;
+bool Run::place_at_start(PreparedStage& stage, ChainEnd& end) {
+  if (!stage.silhouettes.empty())
+    result.drr_count += static_cast<std::int64_t>(problem.views.size());
+  if (stage.place_at(problem, end.room_from_ct)) return true;
   end.stop_reason = StopReason::CtOutsideRoi;
   return false;
 }
@@ -261,9 +263,11 @@ void Run::take_own_similarity(ChainEnd& end) {
   PreparedStage& stage = stages[end.stage];
   const bool has_silhouettes = !stage.silhouettes.empty();
   const bool reused_images = stage.optimizer->needs() != Derivatives::None;
-  if (!(has_silhouettes || reused_images) || !std::isfinite(end.similarity)) return;
-  result.drr_count += (has_silhouettes ? 2 : 1) * static_cast<std::int64_t>(views.size());
-  if (!stage.narrow_to(problem, end.room_from_ct)) return;
+  if (!(reused_images || stage.would_move(problem, end.room_from_ct)) ||
+      !std::isfinite(end.similarity))
+    return;
+  result.drr_count += (has_silhouettes ? 2 : 1) * static_cast<std::int64_t>(problem.views.size());
+  if (!stage.place_at(problem, end.room_from_ct)) return;
   const ObjectiveValue value = stage.objective.evaluate(end.room_from_ct);
   if (value.is_admissible) end.similarity = value.similarity;
 }
@@ -418,7 +422,7 @@ PortfolioEnd Run::finished_best(std::span<const PortfolioEnd> ends) {
     }
   }
   // A correction looks where the finish did.
-  if (best_value.has_value()) (void)stages[best.stage].narrow_to(problem, best.room_from_ct);
+  if (best_value.has_value()) (void)stages[best.stage].place_at(problem, best.room_from_ct);
   return best;
 }
 
@@ -475,7 +479,6 @@ Registration::Registration(std::shared_ptr<const RegistrationProblem> of_problem
     judge = std::move(stages.back());
     stages.pop_back();
   }
-  for (const RegistrationView& view : problem->views) views_.push_back(view.view);
   step_points_ct_ = some_points(problem->scaling_points_ct);
 }
 
@@ -494,11 +497,10 @@ RegistrationResult Registration::search(const RigidTransform& start_room_from_ct
           method,
           stages,
           judge,
-          views_,
           found_,
           start_index,
           start,
-          scaling_at(*problem, views_, start, step_points_ct_),
+          scaling_at(*problem, start, step_points_ct_),
           {}};
   RegistrationResult& result = run.result;
   result.start_room_from_ct = start_room_from_ct;

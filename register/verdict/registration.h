@@ -44,7 +44,7 @@ struct RegistrationRecord {
 /// time spreads over the threads of a pool: views, and poses that do not depend on each other. Runs
 /// at the same time need a registration each. A result depends on problem, method and start alone
 /// (its seconds excepted), not on the number of threads. The DRR range of a case is that of the DRR
-/// at the nominal pose over the region of interest grown by half its size to every side. \test
+/// at the nominal pose over the study's region grown by half its size to every side. \test
 /// Registration.TwoViewsRecoverAKnownPose
 class Registration {
  public:
@@ -84,7 +84,6 @@ class Registration {
   [[nodiscard]] ObjectiveValue similarity_at(const RigidTransform& room_from_ct);
 
  private:
-  std::vector<View> views_;
   std::vector<Eigen::Vector3d> step_points_ct_;
   OptimizerResult found_;  ///< reused
   ViewDiagnoser diagnoser_;

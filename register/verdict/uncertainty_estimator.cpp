@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "geometry/target_box.h"
 #include "register/problem/pose_target.h"
+#include "register/problem/target_region.h"
 #include "register/verdict/calibration.h"
 #include "register/verdict/pose_covariance.h"
 #include "register/verdict/pose_information.h"
@@ -54,7 +55,6 @@ UncertaintyEstimator::UncertaintyEstimator(std::shared_ptr<const RegistrationPro
                                            const std::shared_ptr<ThreadPool>& pool)
     : problem_(std::move(problem)), options_(options) {
   if (options_.is_left_out) return;
-  for (const RegistrationView& view : problem_->views) views_.push_back(view.view);
   std::vector<StageOptions> ends;
   for (const ChainOptions& chain : method.chains) {
     const bool ends_with_finish = !method.finish.stages.empty();
@@ -92,10 +92,11 @@ double UncertaintyEstimator::add_covariance(const RegistrationResult& result,
                                             std::span<const ViewValue> view_values,
                                             UncertaintyReport& report) {
   const PoseFrame frame = PoseFrame::about(result.room_from_ct, problem_->center_ct_mm);
+  const std::vector<View> views = views_at(*problem_, result.room_from_ct);
   const auto basis = projected_motion_basis(result.room_from_ct,
                                             problem_->center_ct_mm,
                                             problem_->scaling_points_ct,
-                                            views_,
+                                            views,
                                             problem_->isocenter_point);
   if (!basis.has_value()) return UncertaintyReport::kNone;
   const std::size_t stage = stage_of_chain_.at(result.chain);
@@ -105,12 +106,12 @@ double UncertaintyEstimator::add_covariance(const RegistrationResult& result,
     return value.in_silhouette == in_silhouette;
   };
   if (!std::ranges::all_of(view_values, is_of_the_stage)) return UncertaintyReport::kNone;
-  if (!ends_[stage].narrow_to(*problem_, result.room_from_ct)) return UncertaintyReport::kNone;
+  if (!ends_[stage].place_at(*problem_, result.room_from_ct)) return UncertaintyReport::kNone;
   auto information = information_at(ends_[stage].objective, frame, *basis, kTiles);
   if (!information.has_value()) return UncertaintyReport::kNone;
   const auto flat_sandwich = sandwich_covariance(*information);
   // Along its beam one view may really be that flat.
-  if (views_.size() > 1)
+  if (views.size() > 1)
     information->curvature = bent_curvature(information->curvature, *basis, information->scatter);
   const auto sandwich = sandwich_covariance(*information);
   if (!flat_sandwich.has_value() || !sandwich.has_value()) return UncertaintyReport::kNone;
@@ -119,7 +120,7 @@ double UncertaintyEstimator::add_covariance(const RegistrationResult& result,
   report.inflation = inflation.pose;
   report.tre_inflation = inflation.tre;
   const PoseMatrix by_shifts =
-      shift_covariance(*information, views_, shifts_mm(ends_[stage].options.level));
+      shift_covariance(*information, views, shifts_mm(ends_[stage].options.level));
   report.covariance_deg_mm = in_deg_mm(inflation.pose * *sandwich + by_shifts);
   if (problem_->target_points_ct.empty()) return UncertaintyReport::kNone;
   const PoseMatrix of_target = inflation.tre * *sandwich + by_shifts;
@@ -127,9 +128,9 @@ double UncertaintyEstimator::add_covariance(const RegistrationResult& result,
   const PredictedTre tre = predicted_tre(of_target, frame, target_ct);
   report.tre_rms_mm = tre.rms_mm;
   report.tre_95_mm = tre.upper_95_mm;
-  if (views_.size() == 1)
+  if (views.size() == 1)
     report.depth_95_mm =
-        depth_95_mm(of_target, frame, mean_point(target_ct), views_.front().camera.source_point);
+        depth_95_mm(of_target, frame, mean_point(target_ct), views.front().camera.source_point);
   return predicted_tre(*flat_sandwich, frame, target_ct).rms_mm;
 }
 

@@ -40,9 +40,9 @@ class UncertaintyEstimator {
 
   /// `view_values`: of PoseExaminer, with backgrounds, at the result's end. Covariance and TREs are
   /// NaN when there is no end, when some motion from it is admissible to neither side, when too
-  /// little of a silhouette is visible, and when values within silhouettes are of a stage that
-  /// looks at the region, or the other way round; the confidence is 0 where
-  /// failure_of() says why there is no end.
+  /// little of a silhouette is visible or X-rays show nothing there, and when values within
+  /// silhouettes are of a stage that looks at the region, or the other way round; the confidence is
+  /// 0 where failure_of() says why there is no end.
   [[nodiscard]] UncertaintyReport report(const RegistrationResult& result,
                                          std::span<const ViewValue> view_values);
 
@@ -58,7 +58,6 @@ class UncertaintyEstimator {
 
   std::shared_ptr<const RegistrationProblem> problem_;
   UncertaintyOptions options_;
-  std::vector<View> views_;
   std::map<std::string, std::size_t> stage_of_chain_;
   std::vector<std::string> similarities_;  ///< of the stages, as registered with
   std::vector<PreparedStage> ends_;        ///< one for every way to end; none: no covariance

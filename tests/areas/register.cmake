@@ -6,6 +6,7 @@ af_add_test(
           unit/register/optimizer/optimizers_test.cpp unit/register/method/prepared_stage_test.cpp
           unit/register/problem/fiducial_mask_test.cpp unit/register/problem/silhouette_test.cpp
           unit/register/method/method_options_test.cpp unit/register/problem/parameter_scaling_test.cpp
+          unit/register/problem/target_region_test.cpp
           unit/register/problem/multi_view_objective_test.cpp unit/register/method/correction_test.cpp
           unit/register/verdict/registration_test.cpp unit/register/verdict/verdict_test.cpp
           unit/register/verdict/pose_covariance_test.cpp unit/register/verdict/uncertainty_estimator_test.cpp

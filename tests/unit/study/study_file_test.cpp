@@ -439,6 +439,9 @@ TEST_F(StudyFile, WithoutARegionTheWholeDetectorCounts) {
   EXPECT_EQ(view.roi.row, 0);
   EXPECT_EQ(view.roi.width, size_px.x());
   EXPECT_EQ(view.roi.height, size_px.y());
+  EXPECT_FALSE(view.is_roi_stated);
+  EXPECT_THAT(study_to_toml(study, folder().path()), testing::Not(HasSubstr("roi_px")));
+  EXPECT_TRUE(read(kGoodStudy).find_case("").views.front().is_roi_stated);
 }
 
 /// The good study with landmarks and no nominal pose: points of the CT as cameras A and B see them

@@ -46,6 +46,19 @@ TEST(MethodOptions, TakeTheRobustPresetUnlessAMeasureOrAnOptimizerIsChosen) {
   EXPECT_EQ(options.preset_name(), "fast");
 }
 
+TEST(MethodOptions, RegionsFollowTheTargetExceptInThePapersMethod) {
+  MethodOptions options;
+  EXPECT_TRUE(resolve(options).region_follows_target);
+  EXPECT_EQ(options.in_force().region, "target");
+  options.preset = "paper";
+  EXPECT_FALSE(resolve(options).region_follows_target);
+  EXPECT_EQ(options.in_force().region, "study");
+  options.region = "target";
+  EXPECT_TRUE(resolve(options).region_follows_target);
+  options.region = "detector";
+  EXPECT_THROW(resolve(options), InputError);
+}
+
 TEST(MethodOptions, ChainsLeaveThePresetsFinishBehindUnlessOneIsTyped) {
   MethodOptions options;
   options.preset = "robust";

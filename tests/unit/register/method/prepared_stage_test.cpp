@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "register/problem/target_region.h"
 #include "unit/register/method/registration_cases.h"
 #include "xray/gaussian_blur.h"
 
@@ -113,6 +114,76 @@ TEST(StageView, AStagePixelIsUsedWhenItsWholeBlockIs) {
   ASSERT_EQ(reference.used.size(), 144U);
   for (std::size_t i = 0; i < reference.used.size(); ++i)
     EXPECT_EQ(reference.used[i], i == 1 ? 0 : 1) << i;
+}
+
+/// Masked, with markers, and regions that follow the middle of the phantom.
+test::SmallCase following_case() {
+  test::SmallCase small = test::small_case();
+  small.problem->target_box_ct = CtBox{{-20, -20, -20}, {20, 20, 20}};
+  for (RegistrationView& view : small.problem->views) {
+    view.view.roi = {12, 13, 24, 22};
+    view.target_region = view.view.roi;
+    view.drr_range = ValueRange{0.0, 5.0};
+    view.mask = Image2d(48, 48);
+    std::fill(view.mask.pixels.begin(), view.mask.pixels.end(), 1.0f);
+    view.mask.at(20, 20) = 0.0f;
+    view.mask_without_markers = view.mask;
+    view.mask_without_markers.at(25, 15) = 0.0f;
+  }
+  return small;
+}
+
+PreparedStage stage_of(const RegistrationProblem& problem, const std::string& text) {
+  return std::move(
+      prepared_stages(problem, problem.views, chain_from_text("x", text).stages, nullptr).front());
+}
+
+/// Moves what the views see by about 9 pixels to the right and up, and to the left and up.
+RigidTransform far_pose() {
+  return pose_from_parameters({}, {.translation_mm = {18, -18, 16}});
+}
+
+TEST(PreparedStage, SeesWhatAStudyWithItsRegionThereWouldShow) {
+  const test::SmallCase small = following_case();
+  for (const char* text : {"ncc gauss-newton", "ncc gauss-newton pixels=3 sigma=4"}) {
+    PreparedStage stage = stage_of(*small.problem, text);
+    EXPECT_FALSE(stage.would_move(*small.problem, small.problem->nominal_room_from_ct));
+    for (const RigidTransform& pose : {small.problem->nominal_room_from_ct, far_pose()}) {
+      RegistrationProblem there = *small.problem;
+      for (RegistrationView& view : there.views) {
+        view.view.roi = region_at(*small.problem, view, pose, stage.options.pixel_step);
+        view.target_region.reset();
+      }
+      const ObjectiveValue value = stage.value_at(*small.problem, pose);
+      ASSERT_TRUE(value.is_admissible) << text;
+      EXPECT_EQ(value.similarity, stage_of(there, text).value_at(there, pose).similarity) << text;
+      EXPECT_EQ(stage.regions[0], there.views[0].view.roi) << text;
+      EXPECT_EQ(stage.objective.views()[1].view.pixel_count(),
+                stage_of(there, text).objective.views()[1].view.pixel_count());
+    }
+    EXPECT_NE(stage.regions[0], small.problem->views[0].view.roi);
+  }
+}
+
+TEST(PreparedStage, IsTheSameAgainWhereverItHasBeen) {
+  const test::SmallCase small = following_case();
+  const char* const text = "gc gauss-newton pixels=2 roi=1.5";
+  PreparedStage stage = stage_of(*small.problem, text);
+  const RigidTransform edge = pose_from_parameters({}, {.translation_mm = {45, 0, 0}});
+  for (const RigidTransform& pose : {far_pose(), small.gold_room_from_ct, edge, far_pose()})
+    EXPECT_EQ(stage.value_at(*small.problem, pose).similarity,
+              stage_of(*small.problem, text).value_at(*small.problem, pose).similarity);
+}
+
+TEST(PreparedStage, StaysWhereTheXrayShowsNothingToCompare) {
+  const test::SmallCase small = following_case();
+  PreparedStage stage = stage_of(*small.problem, "ncc gauss-newton");
+  const auto before = stage.regions;
+  std::fill(
+      small.problem->views[0].xray.pixels.begin(), small.problem->views[0].xray.pixels.end(), 1.0f);
+  EXPECT_FALSE(stage.place_at(*small.problem, far_pose()));
+  EXPECT_FALSE(stage.value_at(*small.problem, far_pose()).is_admissible);
+  EXPECT_EQ(stage.regions, before);
 }
 
 }  // namespace

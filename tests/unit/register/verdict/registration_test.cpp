@@ -12,6 +12,7 @@
 #include "register/method/presets.h"
 #include "register/optimizer/curvature_bounds.h"
 #include "register/problem/pose_target.h"
+#include "register/problem/target_region.h"
 #include "unit/register/method/narrow_drr.h"
 #include "unit/register/method/registration_cases.h"
 
@@ -633,6 +634,38 @@ TEST(PoseTarget, BoundsTheCurvatureOfReweightedResidualsByTheirNormalEquations) 
   EXPECT_LT((with->matrix - kept_between(curving, plain, 0.03, 1.0)).norm(),
             kRounding * plain.norm());
   EXPECT_GT((with->matrix - plain).norm(), 0.1 * plain.norm());
+}
+
+TEST(Registration, OfATargetFarFromTheNominalPoseEndsWithItsRegionThere) {
+  test::SmallCase small = test::small_case();
+  const RigidTransform gold = pose_from_parameters(
+      small.problem->frame(), PoseParameters::from_deg_and_mm({1.5, -2.0, 1.0, 18.0, -18.0, 16.0}));
+  small.problem->target_box_ct = CtBox{{-20, -20, -20}, {20, 20, 20}};
+  for (RegistrationView& view : small.problem->views) {
+    view.xray = render_image(*view.renderer, gold, View::whole_detector(view.view.camera));
+    view.view.roi = {8, 8, 32, 32};
+    view.target_region = view.view.roi;
+  }
+  const PoseFrame about_gold = PoseFrame::about(gold, small.problem->center_ct_mm);
+  const RigidTransform start = pose_from_parameters(
+      about_gold, PoseParameters::from_deg_and_mm({-3.0, 2.0, 2.5, -3.0, 2.5, 2.0}));
+  const RegistrationOptions options = two_stages("ncc", "gauss-newton");
+  Registration registration(small.problem, options);
+  const RegistrationResult result = registration.search(start);
+  EXPECT_LT(mean_distance_mm(result.room_from_ct, gold), kFinalStepErrorMm);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const RegistrationView& view = small.problem->views[i];
+    EXPECT_EQ(registration.stages.back().regions[i],
+              region_at(*small.problem, view, result.room_from_ct));
+    EXPECT_NE(registration.stages.back().regions[i], view.view.roi);
+  }
+  EXPECT_EQ(result.similarity, registration.similarity_at(result.room_from_ct).similarity);
+  // From elsewhere and back: the same bits.
+  (void)registration.search(small.problem->nominal_room_from_ct);
+  const RegistrationResult again = registration.search(start);
+  EXPECT_EQ(again.room_from_ct.matrix(), result.room_from_ct.matrix());
+  EXPECT_EQ(again.similarity, result.similarity);
+  EXPECT_EQ(again.drr_count, result.drr_count);
 }
 
 }  // namespace
