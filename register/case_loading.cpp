@@ -8,9 +8,12 @@
 #include "base/error.h"
 #include "base/joined.h"
 #include "base/number_text.h"
+#include "ct/blurred_volume.h"
 #include "ct/ct_facts.h"
+#include "drr/bone_volume.h"
 #include "drr/field_level.h"
 #include "drr/opened_field.h"
+#include "drr/ray_cast_drr.h"
 #include "files/csv_table.h"
 #include "files/sha256.h"
 #include "geometry/camera_distance.h"
@@ -256,14 +259,16 @@ std::shared_ptr<const OpenedField> field_of_view(const std::string& path,
   return field;
 }
 
-/// Collective. The fields of all views; hashes and notes go to `loaded`.
-void use_fields(const StudyCase& study_case,
-                const CaseLoadOptions& options,
-                const Communicator& communicator,
-                const std::optional<CtFacts>& ct,
-                RegistrationProblem& problem,
-                LoadedCase& loaded) {
+/// Collective. The fields of all views; hashes and notes go to `loaded`. Returns what they made of
+/// HU.
+AttenuationModel use_fields(const StudyCase& study_case,
+                            const CaseLoadOptions& options,
+                            const Communicator& communicator,
+                            const std::optional<CtFacts>& ct,
+                            RegistrationProblem& problem,
+                            LoadedCase& loaded) {
   CtIdentity of_first_field;
+  AttenuationModel model;
   for (std::size_t i = 0; i < problem.views.size(); ++i) {
     RegistrationView& view = problem.views[i];
     const std::string path = all_or_none(communicator, [&] {
@@ -282,20 +287,24 @@ void use_fields(const StudyCase& study_case,
           return opened;
         });
     const CtIdentity& of_field = field->identity().ct;
-    if (i == 0) of_first_field = of_field;
+    if (i == 0) {
+      of_first_field = of_field;
+      model = {field->identity().mu_water_per_mm, field->identity().air_below_hu};
+    }
     all_or_none(communicator, [&] {
       require_same_ct(path, of_first_field, "that of the first field", of_field);
     });
     const std::string name = "field " + view.view.camera.name;
     if (bone) loaded.inputs["bone " + name] = bone->info().payload_sha256;
     view.renderer = renderers.levels.front();
-    view.sample_spacing_mm = node_spacing_mm(*field->opened.coverage().planes.front());
+    view.sample_spacing_mm = node_spacing_mm(*field->coverage().planes.front());
     for (std::size_t level = 0; level < renderers.blur_sigma_mm.size(); ++level)
       view.coarse_levels.push_back({renderers.levels[level + 1], renderers.blur_sigma_mm[level]});
     loaded.input_notes[name] = limit_to_rays(*field, problem, communicator, view) +
                                "; level 0 is looked up by " + renderers.look_up;
     loaded.inputs[name] = field->info().payload_sha256;
   }
+  return model;
 }
 
 /// Blur of a level, mean over the views, mm.
@@ -334,16 +343,41 @@ NodeCt read_node_ct(const StudyCase& study_case,
   });
 }
 
-/// Collective. What fields are checked against.
-CtFacts read_facts(const StudyCase& study_case,
+/// Collective. What fields are checked against, and the target box where ends are judged.
+KnownCt read_known(const StudyCase& study_case,
                    const CaseLoadOptions& options,
                    const Communicator& communicator,
                    std::vector<std::string>& warnings) {
-  auto facts = on_root(communicator, [&] {
-    return read_ct_facts(study_case.ct, study_case.ct_reading, options.attenuation, warnings);
+  auto known = on_root(communicator, [&] {
+    return read_known_ct(
+        study_case.ct,
+        study_case.ct_reading,
+        options.attenuation,
+        options.judging_level > 0 ? std::optional(study_case.target_box_ct) : std::nullopt,
+        warnings);
   });
   return naming_study_line(
-      study_case.places, "ct", [&] { return std::move(facts).share().take(); });
+      study_case.places, "ct", [&] { return std::move(known).share().take(); });
+}
+
+/// RegistrationView::target_casts of all views, from the CT within the target box.
+void add_target_casts(VolumePart box, const AttenuationModel& model, RegistrationProblem& problem) {
+  const auto attenuates = [](const std::vector<std::uint16_t>& voxels) {
+    return std::any_of(voxels.begin(), voxels.end(), [](std::uint16_t voxel) { return voxel > 0; });
+  };
+  if (!attenuates(box.voxels)) return;
+  auto target = std::make_shared<const AttenuationVolume>(
+      box.grid, model, SharedArray<std::uint16_t>(std::move(box.voxels)));
+  // What is soft about a bone stays where it is when the bone moves.
+  if (auto bone = bone_volume(*target); bone->max_mu_per_mm() > 0.0) target = std::move(bone);
+  for (RegistrationView& view : problem.views) {
+    view.target_casts = {std::make_shared<const RayCastDrr>(target)};
+    if (view.coarse_levels.empty()) continue;
+    const double sigma_mm = view.coarse_levels.front().blur_sigma_mm;
+    view.target_casts.push_back(std::make_shared<const RayCastDrr>(
+        blurred_volume(*target, sigma_mm),
+        RayCasterOptions{std::max(RayCasterOptions().step_mm, 0.5 * sigma_mm)}));
+  }
 }
 
 /// Lets the views' regions follow the target box. One that lies partly behind a source leaves the
@@ -398,20 +432,25 @@ LoadedCase load_case(const Study& study,
   if (options.region_follows_target) follow_target(study_case, *problem, loaded.warnings);
   const bool looks_up = options.renderer == RendererKind::Field;
   std::optional<CtFacts> ct;
+  AttenuationModel model = options.attenuation;
+  VolumePart target;
   CastVolumes volumes;
   std::shared_ptr<const DrrRenderer> ray_cast;
   if (!looks_up || !options.correction_levels.empty()) {
     const NodeCt node_ct = read_node_ct(study_case, options, communicator, loaded.warnings);
     ct = node_ct.facts;
+    if (options.judging_level > 0) target = part_within(*node_ct.volume, study_case.target_box_ct);
     volumes = cast_volumes(node_ct.volume, options, communicator);
     ray_cast = ray_cast_through(volumes, options.ray_caster, options);
   } else if (!options.skip_ct_check) {
-    ct = read_facts(study_case, options, communicator, loaded.warnings);
+    KnownCt known = read_known(study_case, options, communicator, loaded.warnings);
+    ct = std::move(known.facts);
+    target = std::move(known.part);
   }
   if (ct.has_value())
     all_or_none(communicator, [&] { require_target_in_ct(study_case, ct->grid); });
   if (looks_up) {
-    use_fields(study_case, options, communicator, ct, *problem, loaded);
+    model = use_fields(study_case, options, communicator, ct, *problem, loaded);
     if (volumes.all) add_ray_casts(volumes, ray_cast, options, communicator, *problem);
   } else {
     const auto levels = coarse_ray_casts(volumes, options, communicator);
@@ -423,6 +462,7 @@ LoadedCase load_case(const Study& study,
   }
 
   all_or_none(communicator, [&] {
+    add_target_casts(std::move(target), model, *problem);
     for (RegistrationView& view : problem->views) view.drr_range = drr_range_of(*problem, view);
   });
 

@@ -47,6 +47,7 @@ struct CaseLoadOptions {
   bool region_follows_target = true;  ///< RegistrationOptions::region_follows_target
   int coarsest_level = 0;  ///< of the image pyramids: RegistrationOptions::coarsest_level()
   /// Level that the verdict needs: PoseExaminer::coarsest_level(). Fields of few nodes have fewer.
+  /// 0: no verdict is wanted, and the target box of the CT is not read.
   int judging_level = 0;
   /// Ray casting: blurs of levels 1, 2, ..., in mm on the isocentre plane; of missing ones, those
   /// of a field with 1 mm between its nodes.

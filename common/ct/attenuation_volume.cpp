@@ -2,6 +2,7 @@
 #include "ct/attenuation_volume.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <string>
 
@@ -92,6 +93,35 @@ std::array<Eigen::Vector3d, 8> AttenuationVolume::corner_points() const {
 double AttenuationVolume::max_total_attenuation() const {
   const Eigen::Vector3d extent_mm = corner_points().back() - corner_points().front();
   return max_mu_per_mm_ * extent_mm.norm();
+}
+
+VolumePart part_within(const AttenuationVolume& volume, const CtBox& box_ct) {
+  const CtGrid& all = volume.grid();
+  Eigen::Array3d low = all.index_of(box_ct.low_mm).array();
+  Eigen::Array3d high = low;
+  for (const Eigen::Vector3d& corner : box_ct.corner_points()) {
+    low = low.min(all.index_of(corner).array());
+    high = high.max(all.index_of(corner).array());
+  }
+  AttenuatingBox inside{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto along = static_cast<Eigen::Index>(axis);
+    const double last = all.size[axis] - 2;
+    inside.low[axis] = static_cast<int>(std::clamp(std::ceil(low[along]), 1.0, last + 1.0));
+    inside.high[axis] = static_cast<int>(std::clamp(std::floor(high[along]), 0.0, last));
+    if (inside.high[axis] < inside.low[axis]) return {};
+  }
+  VolumePart part{bordered_grid(all, inside), {}};
+  part.voxels.resize(part.grid.voxel_count());
+  const int width = inside.high[0] - inside.low[0] + 1;
+  for (int k = inside.low[2]; k <= inside.high[2]; ++k)
+    for (int j = inside.low[1]; j <= inside.high[1]; ++j)
+      std::copy_n(
+          volume.voxels().data() + voxel_offset(all.size, inside.low[0], j, k),
+          width,
+          part.voxels.data() +
+              voxel_offset(part.grid.size, 1, j - inside.low[1] + 1, k - inside.low[2] + 1));
+  return part;
 }
 
 AttenuatingBox attenuating_box(const CtVolume& ct, const AttenuationModel& model) {

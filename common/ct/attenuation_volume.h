@@ -4,9 +4,12 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <tuple>
+#include <vector>
 
 #include "base/described_fields.h"
 #include "ct/ct_volume.h"
+#include "geometry/ct_box.h"
 
 namespace af {
 
@@ -69,6 +72,20 @@ class AttenuationVolume {
   SharedArray<std::uint16_t> voxels_;
   double max_mu_per_mm_ = 0.0;
 };
+
+/// Some of a volume's voxels, with a border of zeros.
+struct VolumePart {
+  CtGrid grid;
+  std::vector<std::uint16_t> voxels;  ///< none: the part is empty
+
+  auto members() {
+    return std::tie(grid.size, grid.origin_mm, grid.spacing_mm, grid.direction, voxels);
+  }
+};
+
+/// The voxels between the first and the last index, along each axis of the grid, that a box of the
+/// ct frame reaches. \test AttenuationVolume.APartHoldsTheVoxelsOfItsBox
+VolumePart part_within(const AttenuationVolume& volume, const CtBox& box_ct);
 
 /// The voxels of a CT that attenuate lie within these indices, inclusive.
 struct AttenuatingBox {

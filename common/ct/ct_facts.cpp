@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <system_error>
+#include <utility>
 
 #include "base/build_id.h"
 #include "base/number_text.h"
@@ -77,28 +78,51 @@ std::optional<std::string> key_of(const fs::path& path,
   return hash.hex_digest();
 }
 
+std::string key_of_part(const std::string& key_of_facts, const CtBox& box_ct) {
+  Sha256 hash;
+  hash.update(bytes_of(key_of_facts));
+  hash.update(bytes_of(box_ct));
+  return hash.hex_digest();
+}
+
 }  // namespace
 
 CtFacts facts_of(const CtVolume& ct, const AttenuationModel& model, const AttenuatingBox& box) {
   return {ct.grid, identity_of(ct), cut_points(ct, model, box)};
 }
 
+KnownCt read_known_ct(const fs::path& path,
+                      const CtReadOptions& options,
+                      const AttenuationModel& model,
+                      const std::optional<CtBox>& box_ct,
+                      std::vector<std::string>& warnings) {
+  note_input(path);
+  const std::optional<std::string> key = key_of(path, options, model);
+  const std::string part_key = key && box_ct ? key_of_part(*key, *box_ct) : "";
+  std::optional<KeptFacts> kept = key ? cached<KeptFacts>(*key) : std::nullopt;
+  std::optional<VolumePart> part;
+  if (!box_ct) part.emplace();
+  if (kept && !part) part = cached<VolumePart>(part_key);
+  if (!kept || !part) {
+    kept.emplace();
+    const CtVolume ct = read_ct(path, options, &kept->warnings);
+    kept->facts = facts_of(ct, model, attenuating_box(ct, model));
+    part = box_ct ? part_within(AttenuationVolume(ct, model), *box_ct) : VolumePart();
+    // Meanwhile the files may have been written anew.
+    if (key && key_of(path, options, model) == key) {
+      keep_in_cache(*key, *kept);
+      if (box_ct) keep_in_cache(part_key, *part);
+    }
+  }
+  warnings.insert(warnings.end(), kept->warnings.begin(), kept->warnings.end());
+  return {std::move(kept->facts), std::move(*part)};
+}
+
 CtFacts read_ct_facts(const fs::path& path,
                       const CtReadOptions& options,
                       const AttenuationModel& model,
                       std::vector<std::string>& warnings) {
-  note_input(path);
-  const std::optional<std::string> key = key_of(path, options, model);
-  std::optional<KeptFacts> kept = key ? cached<KeptFacts>(*key) : std::nullopt;
-  if (!kept) {
-    kept.emplace();
-    const CtVolume ct = read_ct(path, options, &kept->warnings);
-    kept->facts = facts_of(ct, model, attenuating_box(ct, model));
-    // Meanwhile the files may have been written anew.
-    if (key && key_of(path, options, model) == key) keep_in_cache(*key, *kept);
-  }
-  warnings.insert(warnings.end(), kept->warnings.begin(), kept->warnings.end());
-  return kept->facts;
+  return read_known_ct(path, options, model, std::nullopt, warnings).facts;
 }
 
 }  // namespace af

@@ -29,6 +29,22 @@ struct CtFacts {
 /// `box` is the CT's attenuating_box().
 CtFacts facts_of(const CtVolume& ct, const AttenuationModel& model, const AttenuatingBox& box);
 
+/// The facts, and a part of the CT's attenuation.
+struct KnownCt {
+  CtFacts facts;
+  VolumePart part;
+
+  auto members() { return std::tie(facts, part); }
+};
+
+/// read_ct_facts(), and the part of the CT within a box of the ct frame, kept likewise. Without a
+/// box the part is empty.
+KnownCt read_known_ct(const std::filesystem::path& path,
+                      const CtReadOptions& options,
+                      const AttenuationModel& model,
+                      const std::optional<CtBox>& box_ct,
+                      std::vector<std::string>& warnings);
+
 /// facts_of() what read_ct() reads, with its errors and warnings. Voxels are decoded only if the
 /// user's cache (files/user_cache.h) does not know files of these bytes under this path, read in
 /// this way: otherwise the files are only hashed.

@@ -45,6 +45,9 @@ struct RegistrationView {
   std::optional<MotionLimit> reach;
   /// [level] Ray casting, where a correction needs it; else none.
   std::vector<std::shared_ptr<const DrrRenderer>> ray_casts;
+  /// [level] Ray casting of the target box alone, of its bone where it has some, blurred as the
+  /// level's DRRs: 0 and 1; none where the CT is not at hand.
+  std::vector<std::shared_ptr<const DrrRenderer>> target_casts;
   /// Of the DRR at the nominal pose, over the region grown by half its size to every side, which no
   /// X-ray changes; none: whoever needs it makes that DRR.
   std::optional<ValueRange> drr_range;

@@ -59,6 +59,8 @@ CsvCells uncertainty_cells(const UncertaintyReport& report, double chain_distanc
   CsvCells cells = {{"predicted_tre_rms_mm", report.tre_rms_mm},
                     {"predicted_tre_95_mm", report.tre_95_mm},
                     {"predicted_depth_95_mm", report.depth_95_mm},
+                    {"target_share", report.target.share},
+                    {"target_apart_mm", report.target.apart_mm},
                     {"confidence", report.confidence},
                     {"covariance_inflation", report.inflation},
                     {"tre_inflation", report.tre_inflation},

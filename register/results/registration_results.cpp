@@ -167,6 +167,8 @@ json uncertainty_json(const RegistrationRecord& record) {
           {"tre_rms_mm", number_or_null(report.tre_rms_mm)},
           {"tre_95_mm", number_or_null(report.tre_95_mm)},
           {"depth_95_mm", number_or_null(report.depth_95_mm)},
+          {"target_share", number_or_null(report.target.share)},
+          {"target_apart_mm", number_or_null(report.target.apart_mm)},
           {"chain_distance_mm", number_or_null(record.result.chain_distance_mm)},
           {"confidence", number_or_null(report.confidence)}};
 }

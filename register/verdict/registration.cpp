@@ -485,6 +485,8 @@ Registration::Registration(std::shared_ptr<const RegistrationProblem> of_problem
 void Registration::examine_ends(const UncertaintyOptions& options,
                                 const std::shared_ptr<ThreadPool>& threads) {
   uncertainty.emplace(problem, method, options, threads);
+  // Within silhouettes the CT is the target.
+  if (method.silhouette_mm() == 0.0) target_examiner.emplace(problem, threads);
   examiner.emplace(problem, method.silhouette_mm());
 }
 
@@ -523,6 +525,8 @@ RegistrationRecord Registration::run(const RigidTransform& start_room_from_ct,
   if (!examiner) return record;
   record.view_values = examiner->view_values(record.result.room_from_ct, true);
   record.uncertainty = uncertainty->report(record.result, record.view_values);
+  if (target_examiner && judgement_of(record).verdict == Verdict::Found)
+    record.uncertainty.target = target_examiner->evidence(record.result.room_from_ct);
   return record;
 }
 
@@ -545,7 +549,9 @@ Judgement judgement_of(const RegistrationRecord& record) {
   // Whatever leaves a doubt, however high the confidence is, belongs to these.
   std::vector<std::string> reasons = record.diagnosis.messages;
   if (!failure.has_value())
-    for (const std::string& doubt : doubts_of(result, record.view_values)) reasons.push_back(doubt);
+    for (const std::string& doubt :
+         doubts_of(result, record.view_values, record.uncertainty.target))
+      reasons.push_back(doubt);
   if (!reasons.empty() && judgement.verdict == Verdict::Found)
     judgement.verdict = Verdict::Doubtful;
   reasons.insert(reasons.begin(), judgement.reason);

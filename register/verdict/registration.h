@@ -14,6 +14,7 @@
 #include "register/method/prepared_stage.h"
 #include "register/method/registration_result.h"
 #include "register/verdict/pose_examiner.h"
+#include "register/verdict/target_examiner.h"
 #include "register/verdict/uncertainty_estimator.h"
 #include "register/verdict/view_diagnosis.h"
 
@@ -68,6 +69,7 @@ class Registration {
   std::vector<PreparedStage> stages;
   std::optional<PreparedStage> judge;               ///< chooses among the ends of a portfolio
   std::optional<PoseExaminer> examiner;             ///< values the end view by view
+  std::optional<TargetExaminer> target_examiner;    ///< asks the target of an end that is found
   std::optional<UncertaintyEstimator> uncertainty;  ///< how far the end may be from the truth
 
   /// From a start to its end: chain by chain, stage by stage, the choice among their ends, the

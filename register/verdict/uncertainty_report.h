@@ -6,6 +6,8 @@
 #include <limits>
 #include <tuple>
 
+#include "register/verdict/target_evidence.h"
+
 namespace af::registration {
 
 /// What a registration says of its own error. Numbers alone: millions are held in memory. NaN where
@@ -23,6 +25,7 @@ struct UncertaintyReport {
   /// With one view: the target's centre lies within this, to either side, along the beam with
   /// probability 0.95.
   double depth_95_mm = kNone;
+  TargetEvidence target;         ///< of an end that would be found without it
   double inflation = kNone;      ///< what calibration multiplied the sandwich by for the covariance
   double tre_inflation = kNone;  ///< and for the TREs
   /// Probability that the registration succeeded (success_confidence()); a lower bound where
@@ -34,6 +37,7 @@ struct UncertaintyReport {
                     tre_rms_mm,
                     tre_95_mm,
                     depth_95_mm,
+                    target,
                     inflation,
                     tre_inflation,
                     confidence);

@@ -27,6 +27,14 @@ bool is_far_below_others(std::size_t view,
          values[view].*value < std::min(well_explained, kLeastShareOfOthers * highest);
 }
 
+/// Rounded up: "0.1 mm", "9.9 mm", "24 mm".
+std::string length_text(double mm) {
+  const auto tenths = static_cast<std::int64_t>(std::ceil(10.0 * mm));
+  return (tenths < 100 ? std::to_string(tenths / 10) + "." + std::to_string(tenths % 10)
+                       : std::to_string((tenths + 9) / 10)) +
+         " mm";
+}
+
 }  // namespace
 
 const char* to_string(Verdict verdict) {
@@ -58,7 +66,8 @@ std::optional<std::string> failure_of(StopReason stop_reason) {
 }
 
 std::vector<std::string> doubts_of(const RegistrationResult& result,
-                                   std::span<const ViewValue> values) {
+                                   std::span<const ViewValue> values,
+                                   const TargetEvidence& target) {
   std::vector<std::string> doubts;
   if (result.stop_reason == StopReason::PinnedAtLimit)
     doubts.push_back((result.pinned_along.empty()
@@ -71,6 +80,13 @@ std::vector<std::string> doubts_of(const RegistrationResult& result,
     if (!std::isfinite(values[i].coarse) || !std::isfinite(values[i].fine))
       doubts.push_back("X-ray " + std::to_string(i + 1) + " of " + std::to_string(values.size()) +
                        " cannot be judged: it shows no gradients over most of twice the region");
+  if (target.share < kLeastTargetShare)
+    doubts.push_back("the target shows nothing of its own: of what the pose explains there, " +
+                     percent_text(1.0 - target.share) + " is its surroundings");
+  else if (target.apart_mm > kTargetApartMm)
+    doubts.push_back("the target disagrees with its surroundings: by itself it fits " +
+                     length_text(target.apart_mm) +
+                     " from here; it may have moved against the rest");
   return doubts;
 }
 

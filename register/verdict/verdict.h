@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "register/method/registration_result.h"
+#include "register/verdict/target_evidence.h"
 #include "register/verdict/uncertainty_report.h"
 
 namespace af::registration {
@@ -70,9 +71,11 @@ inline constexpr double kLeastShareOfOthers = 0.5;
 std::optional<std::string> failure_of(StopReason stop_reason);
 
 /// What leaves a doubt in an end, however probable it is that it is right: how the search stopped,
-/// and an X-ray that cannot be judged.
+/// an X-ray that cannot be judged, and a target that shows nothing of its own or disagrees with its
+/// surroundings. \test Judgement.ATargetThatDisagreesWithItsSurroundingsIsDoubtful
 std::vector<std::string> doubts_of(const RegistrationResult& result,
-                                   std::span<const ViewValue> values);
+                                   std::span<const ViewValue> values,
+                                   const TargetEvidence& target);
 
 /// The verdict by the probability that the end is right, UncertaintyReport::confidence. Where no
 /// TRE is predicted, the confidence is a lower bound, by which nothing is rejected.

@@ -78,6 +78,22 @@ TEST(Judgement, WithoutAPredictedTreRejectsNothing) {
   EXPECT_EQ(verdict_of(record), Verdict::NotFound);
 }
 
+TEST(Judgement, ATargetThatDisagreesWithItsSurroundingsIsDoubtful) {
+  const auto record_of = [](double confidence, const TargetEvidence& target) {
+    RegistrationRecord record = record_with(confidence);
+    record.uncertainty.target = target;
+    return record;
+  };
+  EXPECT_EQ(verdict_of(record_of(0.9968, {0.7, 0.74})), Verdict::Found);
+  EXPECT_EQ(verdict_of(record_of(0.9968, {0.7, 0.76})), Verdict::Doubtful);
+  EXPECT_EQ(verdict_of(record_of(0.01, {0.7, 3.5})), Verdict::NotFound);
+  EXPECT_EQ(verdict_of(record_of(0.9968, {0.04, 0.0})), Verdict::Doubtful);
+  EXPECT_EQ(verdict_of(record_of(0.9968, {})), Verdict::Found) << "it was not asked";
+  EXPECT_THAT(judgement_of(record_of(0.9968, {0.7, 3.42})).reason,
+              testing::EndsWith("the target disagrees with its surroundings: by itself it fits 3.5 "
+                                "mm from here; it may have moved against the rest"));
+}
+
 TEST(Judgement, OfOneViewSaysWhatIsNotKnown) {
   const auto record_of = [](double confidence, double depth_95_mm, std::size_t views) {
     RegistrationRecord record = record_with(confidence, std::vector<ViewValue>(views, {0.9, 0.9}));

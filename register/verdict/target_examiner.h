@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+
+#include "base/thread_pool.h"
+#include "geometry/rigid_transform.h"
+#include "register/problem/registration_problem.h"
+#include "register/verdict/target_evidence.h"
+
+namespace af::registration {
+
+/// Asks the target of a case about poses: DRRs in which it alone moves (PartMotionDrr) are compared
+/// with the X-rays about its shadow, by the measure of portfolios' judge. Without this, a pose that
+/// fits everything but a bone that moved is taken for that bone's. For one thread at a time.
+/// \test TargetExaminer.TellsHowFarTheTargetMovedAgainstTheRest
+class TargetExaminer {
+ public:
+  /// `threads`: none means the calling thread alone.
+  explicit TargetExaminer(std::shared_ptr<const RegistrationProblem> problem,
+                          std::shared_ptr<ThreadPool> threads = nullptr);
+
+  /// Nothing where a view has no target_casts or does not see the target, where its X-ray shows no
+  /// gradients there, and where a field does not hold the pose.
+  [[nodiscard]] TargetEvidence evidence(const RigidTransform& room_from_ct) const;
+
+ private:
+  std::shared_ptr<const RegistrationProblem> problem_;
+  std::shared_ptr<ThreadPool> threads_;
+};
+
+}  // namespace af::registration
