@@ -92,6 +92,7 @@ Phantom with_moved_bone(Phantom phantom,
     left_behind.push_back(solid);
     left_behind.back().hu = kMuscleHu;
     left_behind.back().texture_hu = 0;
+    left_behind.back().bone = {};
     solid = moved(solid, rest_from_bone);
   }
   const auto first_bone =

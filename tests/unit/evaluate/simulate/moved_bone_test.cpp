@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <ranges>
 #include <set>
 #include <string>
@@ -24,6 +25,10 @@ struct Subject {
   std::string phantom;
   std::string bone;
 };
+
+void PrintTo(const Subject& subject, std::ostream* out) {
+  *out << subject.phantom << ' ' << subject.bone;
+}
 
 /// Every bone of every phantom.
 std::vector<Subject> subjects() {
@@ -62,6 +67,17 @@ int hu_at(const Phantom& phantom, const Vector3d& point) {
   for (const Solid& solid : std::views::reverse(phantom.solids))
     if (solid.contains(point)) return solid.hu;
   return kGasHu;
+}
+
+/// Uniform in the body's box; none when it is not in the body.
+std::optional<Vector3d> drawn_point(const Solid& solid, HashRandom& random) {
+  const double x = random.uniform(-1.0, 1.0);
+  const double y = random.uniform(-1.0, 1.0);
+  const double z = random.uniform(-1.0, 1.0);
+  const Vector3d point =
+      solid.center_mm + solid.rotation * solid.reach_mm().cwiseProduct(Vector3d(x, y, z));
+  if (!solid.contains(point)) return std::nullopt;
+  return point;
 }
 
 /// Points of a plane through the bone that rays of source_point pass.
@@ -118,9 +134,9 @@ TEST_P(EveryMovedBone, DiffersWithinItsShadowsAndNowhereElse) {
 }
 
 TEST_P(EveryMovedBone, IsSeenByARayWhereItsPoseSaysIt) {
-  // The moved bone as the pose of the rest sees it is the unmoved one as the gold pose does, with
-  // its texture: roots of quadratics, to 1e-6 mm where there are waists, textures after turns.
-  constexpr double kToleranceMm = 1e-4;
+  // The moved bone in the pose of the rest is the unmoved one in the gold pose, with its texture.
+  // Of some hundred steps of up to 1.5 mm, a few may round to another HU: 0.0015 mm each.
+  constexpr double kToleranceMm = 0.02;
   Phantom old_bodies = alone(still_, bone_);
   Phantom new_bodies = alone(moved_, bone_);
   for (Phantom* bodies : {&old_bodies, &new_bodies})  // no faces
@@ -143,46 +159,37 @@ TEST_P(EveryMovedBone, IsSeenByARayWhereItsPoseSaysIt) {
 }
 
 TEST_P(EveryMovedBone, LeavesSoftTissueWhereItWas) {
+  constexpr int kLowestSoftHu = -200;
   HashRandom random(5);
   for (const Solid& solid : still_.solids) {
     if (solid.bone != bone_) continue;
     for (int i = 0; i < 40; ++i) {
-      const double x = random.uniform(-1.0, 1.0);
-      const double y = random.uniform(-1.0, 1.0);
-      const double z = random.uniform(-1.0, 1.0);
-      const Vector3d point =
-          solid.center_mm + solid.rotation * solid.reach_mm().cwiseProduct(Vector3d(x, y, z));
-      if (!solid.contains(point) || hu_at(still_, point) < -200) continue;
-      EXPECT_GT(hu_at(moved_, point), -200) << point.transpose();
+      const std::optional<Vector3d> point = drawn_point(solid, random);
+      if (!point || hu_at(still_, *point) < kLowestSoftHu) continue;
+      EXPECT_GT(hu_at(moved_, *point), kLowestSoftHu) << point->transpose();
     }
   }
 }
 
 TEST_P(EveryMovedBone, HardlyRunsIntoWhatStays) {
-  // Bodies overlap at joints at rest, too.
-  constexpr double kMostShare = 0.1;
+  // Some bodies overlap at joints at rest, too. 3 %: 0.2 mm of a plate that is 7 mm thick.
+  constexpr double kMostShare = 0.03;
   Phantom rest = still_;
   std::erase_if(rest.solids, [&](const Solid& solid) { return solid.bone == bone_; });
-  for (const std::uint64_t seed : {1U, 2U, 3U}) {
-    const RigidTransform motion = drawn_motion(still_, bone_, seed);
-    HashRandom random(seed);
-    int inside = 0;
-    int blocked = 0;
-    for (const Solid& solid : alone(still_, bone_).solids)
-      for (int i = 0; i < 20; ++i) {
-        const double x = random.uniform(-1.0, 1.0);
-        const double y = random.uniform(-1.0, 1.0);
-        const double z = random.uniform(-1.0, 1.0);
-        const Vector3d point =
-            solid.center_mm + solid.rotation * solid.reach_mm().cwiseProduct(Vector3d(x, y, z));
-        if (!solid.contains(point)) continue;
-        ++inside;
-        blocked += (hu_at(rest, motion * point) >= kBoneHu ? 1 : 0) -
-                   (hu_at(rest, point) >= kBoneHu ? 1 : 0);
-      }
-    std::printf("%s seed %d blocked %.4f\n", bone_.c_str(), (int)seed, blocked / double(inside));
-    EXPECT_LT(blocked, kMostShare * inside) << seed;
+  HashRandom random(3);
+  int inside = 0;
+  int blocked = 0;
+  for (const Solid& solid : still_.solids) {
+    if (solid.bone != bone_) continue;
+    for (int i = 0; i < 10; ++i) {
+      const std::optional<Vector3d> point = drawn_point(solid, random);
+      if (!point) continue;
+      ++inside;
+      blocked += (hu_at(rest, rest_from_bone_ * *point) >= kBoneHu ? 1 : 0) -
+                 (hu_at(rest, *point) >= kBoneHu ? 1 : 0);
+    }
   }
+  EXPECT_LT(blocked, kMostShare * inside);
 }
 
 INSTANTIATE_TEST_SUITE_P(Bones,
@@ -198,7 +205,7 @@ TEST(MovedBone, TurnsAndShiftsByWhatIsStated) {
   const Phantom phantom = make_phantom("pelvis", false, kPatient);
   const Vector3d center = bone_of(phantom, "left-femur").target.center_ct_mm;
   std::set<double> shifts_mm;
-  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     const RigidTransform motion = drawn_motion(phantom, "left-femur", seed);
     const double turn_deg =
         rotation_angle_between_rad(RigidTransform::Identity(), motion) * kDegPerRad;
@@ -210,7 +217,7 @@ TEST(MovedBone, TurnsAndShiftsByWhatIsStated) {
     EXPECT_TRUE(motion.isApprox(drawn_motion(phantom, "left-femur", seed), 0.0)) << seed;
     shifts_mm.insert(shift_mm);
   }
-  EXPECT_EQ(shifts_mm.size(), 12u);
+  EXPECT_EQ(shifts_mm.size(), 8u);
 }
 
 TEST(MovedBone, TakesItsImplantsAlong) {
