@@ -2,6 +2,8 @@
 #include "register/case_loading.h"
 
 #include <algorithm>
+#include <map>
+#include <numeric>
 #include <tuple>
 #include <utility>
 
@@ -343,6 +345,12 @@ NodeCt read_node_ct(const StudyCase& study_case,
   });
 }
 
+/// Whether ends are judged, and the target by itself, too. DRRs of another beam are no sums of its
+/// DRRs and those of the rest.
+bool asks_target(const CaseLoadOptions& options) {
+  return options.judging_level > 0 && options.beam.is_ordinary();
+}
+
 /// Collective. What fields are checked against, and the target box where ends are judged.
 KnownCt read_known(const StudyCase& study_case,
                    const CaseLoadOptions& options,
@@ -360,47 +368,36 @@ KnownCt read_known(const StudyCase& study_case,
       study_case.places, "ct", [&] { return std::move(known).share().take(); });
 }
 
+/// The bone in a volume, which is what moves; all of it where that is hardly any of what
+/// attenuates.
+std::shared_ptr<const AttenuationVolume> bone_or_all(const AttenuationVolume& volume) {
+  constexpr double kLeastBone = 0.05;
+  const auto sum = [](const AttenuationVolume& of) {
+    return std::accumulate(of.voxels().begin(), of.voxels().end(), 0.0);
+  };
+  auto bone = bone_volume(volume);
+  return sum(*bone) >= kLeastBone * sum(volume) ? bone
+                                                : std::make_shared<AttenuationVolume>(volume);
+}
+
 /// RegistrationView::target_casts of all views, from the CT within the target box.
 void add_target_casts(VolumePart box, const AttenuationModel& model, RegistrationProblem& problem) {
-  const auto attenuates = [](const std::vector<std::uint16_t>& voxels) {
-    return std::any_of(voxels.begin(), voxels.end(), [](std::uint16_t voxel) { return voxel > 0; });
-  };
-  if (!attenuates(box.voxels)) return;
-  auto target = std::make_shared<const AttenuationVolume>(
-      box.grid, model, SharedArray<std::uint16_t>(std::move(box.voxels)));
-  // What is soft about a bone stays where it is when the bone moves.
-  if (auto bone = bone_volume(*target); bone->max_mu_per_mm() > 0.0) target = std::move(bone);
+  if (std::all_of(
+          box.voxels.begin(), box.voxels.end(), [](std::uint16_t voxel) { return voxel == 0; }))
+    return;
+  const auto target = bone_or_all(
+      AttenuationVolume(box.grid, model, SharedArray<std::uint16_t>(std::move(box.voxels))));
+  std::map<double, std::shared_ptr<const DrrRenderer>> by_sigma_mm;
   for (RegistrationView& view : problem.views) {
     view.target_casts = {std::make_shared<const RayCastDrr>(target)};
     if (view.coarse_levels.empty()) continue;
     const double sigma_mm = view.coarse_levels.front().blur_sigma_mm;
-    view.target_casts.push_back(std::make_shared<const RayCastDrr>(
-        blurred_volume(*target, sigma_mm),
-        RayCasterOptions{std::max(RayCasterOptions().step_mm, 0.5 * sigma_mm)}));
-  }
-}
-
-/// Lets the views' regions follow the target box. One that lies partly behind a source leaves the
-/// region of that view in its place.
-void follow_target(const StudyCase& study_case,
-                   RegistrationProblem& problem,
-                   std::vector<std::string>& warnings) {
-  for (std::size_t i = 0; i < problem.views.size(); ++i) {
-    RegistrationView& view = problem.views[i];
-    const CameraGeometry& camera = view.view.camera;
-    const auto box = projected_box(study_case.target_box_ct, problem.nominal_room_from_ct, camera);
-    if (!box.has_value()) continue;
-    std::optional<RegionOfInterest> stated;
-    if (study_case.views[i].is_roi_stated) stated = view.view.roi;
-    view.target_region = target_region_about(*box, stated, study_case.is_nominal_stated);
-    const Eigen::Vector2d size_px = box->high_px - box->low_px;
-    if ((size_px.array() > camera.size_px.array().cast<double>()).any())
-      warnings.push_back(
-          "target_box_ct_mm: at the nominal pose the target box is wider or higher "
-          "than the beam of camera '" +
-          camera.name + "': " + fixed_text(size_px.x(), 0) + " x " + fixed_text(size_px.y(), 0) +
-          " pixels of " + std::to_string(camera.size_px.x()) + " x " +
-          std::to_string(camera.size_px.y()) + "; what lies beyond the detector is not compared");
+    auto& blurred = by_sigma_mm[sigma_mm];
+    if (!blurred)
+      blurred = std::make_shared<const RayCastDrr>(
+          blurred_volume(*target, sigma_mm),
+          RayCasterOptions{std::max(RayCasterOptions().step_mm, 0.5 * sigma_mm)});
+    view.target_casts.push_back(blurred);
   }
 }
 
@@ -439,7 +436,9 @@ LoadedCase load_case(const Study& study,
   if (!looks_up || !options.correction_levels.empty()) {
     const NodeCt node_ct = read_node_ct(study_case, options, communicator, loaded.warnings);
     ct = node_ct.facts;
-    if (options.judging_level > 0) target = part_within(*node_ct.volume, study_case.target_box_ct);
+    if (asks_target(options))
+      target = all_or_none(communicator,
+                           [&] { return part_within(*node_ct.volume, study_case.target_box_ct); });
     volumes = cast_volumes(node_ct.volume, options, communicator);
     ray_cast = ray_cast_through(volumes, options.ray_caster, options);
   } else if (!options.skip_ct_check) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <string>
 
 #include "base/error.h"
@@ -17,6 +18,35 @@ std::size_t voxel_offset(const std::array<int, 3>& size, int i, int j, int k) {
           static_cast<std::size_t>(j)) *
              static_cast<std::size_t>(size[0]) +
          static_cast<std::size_t>(i);
+}
+
+/// The indices of voxels whose centres lie within a box of the ct frame, along each axis of the
+/// grid, of those between two; none where there are none.
+std::optional<AttenuatingBox> indices_within(const CtGrid& grid,
+                                             const AttenuatingBox& all,
+                                             const CtBox& box_ct) {
+  Eigen::Array3d low = grid.index_of(box_ct.low_mm).array();
+  Eigen::Array3d high = low;
+  for (const Eigen::Vector3d& corner : box_ct.corner_points()) {
+    low = low.min(grid.index_of(corner).array());
+    high = high.max(grid.index_of(corner).array());
+  }
+  AttenuatingBox inside = all;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto along = static_cast<Eigen::Index>(axis);
+    const double first = std::max<double>(all.low[axis], std::ceil(low[along]));
+    const double last = std::min<double>(all.high[axis], std::floor(high[along]));
+    if (!(first <= last)) return std::nullopt;
+    inside.low[axis] = static_cast<int>(first);
+    inside.high[axis] = static_cast<int>(last);
+  }
+  return inside;
+}
+
+VolumePart empty_part(const CtGrid& grid, const AttenuatingBox& inside) {
+  VolumePart part{bordered_grid(grid, inside), {}};
+  part.voxels.resize(part.grid.voxel_count());
+  return part;
 }
 
 }  // namespace
@@ -96,31 +126,28 @@ double AttenuationVolume::max_total_attenuation() const {
 }
 
 VolumePart part_within(const AttenuationVolume& volume, const CtBox& box_ct) {
-  const CtGrid& all = volume.grid();
-  Eigen::Array3d low = all.index_of(box_ct.low_mm).array();
-  Eigen::Array3d high = low;
-  for (const Eigen::Vector3d& corner : box_ct.corner_points()) {
-    low = low.min(all.index_of(corner).array());
-    high = high.max(all.index_of(corner).array());
-  }
-  AttenuatingBox inside{};
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const auto along = static_cast<Eigen::Index>(axis);
-    const double last = all.size[axis] - 2;
-    inside.low[axis] = static_cast<int>(std::clamp(std::ceil(low[along]), 1.0, last + 1.0));
-    inside.high[axis] = static_cast<int>(std::clamp(std::floor(high[along]), 0.0, last));
-    if (inside.high[axis] < inside.low[axis]) return {};
-  }
-  VolumePart part{bordered_grid(all, inside), {}};
-  part.voxels.resize(part.grid.voxel_count());
-  const int width = inside.high[0] - inside.low[0] + 1;
-  for (int k = inside.low[2]; k <= inside.high[2]; ++k)
-    for (int j = inside.low[1]; j <= inside.high[1]; ++j)
+  const auto& size = volume.grid().size;
+  const auto inside =
+      indices_within(volume.grid(), {{1, 1, 1}, {size[0] - 2, size[1] - 2, size[2] - 2}}, box_ct);
+  if (!inside) return {};
+  VolumePart part = empty_part(volume.grid(), *inside);
+  const auto& [low, high] = *inside;
+  for (int k = low[2]; k <= high[2]; ++k)
+    for (int j = low[1]; j <= high[1]; ++j)
       std::copy_n(
-          volume.voxels().data() + voxel_offset(all.size, inside.low[0], j, k),
-          width,
-          part.voxels.data() +
-              voxel_offset(part.grid.size, 1, j - inside.low[1] + 1, k - inside.low[2] + 1));
+          volume.voxels().data() + voxel_offset(size, low[0], j, k),
+          high[0] - low[0] + 1,
+          part.voxels.data() + voxel_offset(part.grid.size, 1, j - low[1] + 1, k - low[2] + 1));
+  return part;
+}
+
+VolumePart part_within(const CtVolume& ct, const AttenuationModel& model, const CtBox& box_ct) {
+  const auto& size = ct.grid.size;
+  const auto inside =
+      indices_within(ct.grid, {{0, 0, 0}, {size[0] - 1, size[1] - 1, size[2] - 1}}, box_ct);
+  if (!inside) return {};
+  VolumePart part = empty_part(ct.grid, *inside);
+  AttenuationVolume::fill_voxels(ct, model, part.grid, part.voxels);
   return part;
 }
 

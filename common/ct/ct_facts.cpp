@@ -107,7 +107,7 @@ KnownCt read_known_ct(const fs::path& path,
     kept.emplace();
     const CtVolume ct = read_ct(path, options, &kept->warnings);
     kept->facts = facts_of(ct, model, attenuating_box(ct, model));
-    part = box_ct ? part_within(AttenuationVolume(ct, model), *box_ct) : VolumePart();
+    part = box_ct ? part_within(ct, model, *box_ct) : VolumePart();
     // Meanwhile the files may have been written anew.
     if (key && key_of(path, options, model) == key) {
       keep_in_cache(*key, *kept);

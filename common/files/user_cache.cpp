@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::size_t kChecksumDigits = 64;
-constexpr std::size_t kMostBytes = 16u << 20;
+constexpr std::size_t kMostBytes = 64u << 20;
 
 /// A folder named by the environment; as the XDG Base Directory Specification asks, a relative path
 /// counts as none.

@@ -294,7 +294,8 @@ PreparedStage stage_over(const RegistrationProblem& problem,
 }  // namespace
 
 ValueRange drr_range_of(const RegistrationProblem& problem, const RegistrationView& view) {
-  const View wide{view.view.camera, grown(view.view.roi, view.view.camera.size_px)};
+  const RegionOfInterest region = region_at(problem, view, problem.nominal_room_from_ct);
+  const View wide{view.view.camera, grown(region, view.view.camera.size_px)};
   std::int64_t rays_outside = 0;
   const Image2d drr =
       render_image(*view.renderer, problem.nominal_room_from_ct, wide, &rays_outside);

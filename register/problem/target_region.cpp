@@ -42,7 +42,7 @@ PixelRange about_box(double low_px,
   return {first, std::max(stated->first + stated->count, box.first + box.count) - first};
 }
 
-/// The part on the detector of a range that has moved by about `motion_px`.
+/// A range that has moved by about `motion_px`.
 PixelRange moved(const PixelRange& range, double motion_px, int step_px, int size_px) {
   // As far as its middle stays on the detector.
   const int middle = range.first + range.count / 2;
@@ -50,8 +50,7 @@ PixelRange moved(const PixelRange& range, double motion_px, int step_px, int siz
   const double highest = step_px * (std::max(0, size_px - middle) / step_px);
   const int first = range.first + static_cast<int>(std::clamp(
                                       step_px * std::round(motion_px / step_px), lowest, highest));
-  const int begin = std::clamp(first, 0, size_px - 1);
-  return {begin, std::max(1, std::min(first + range.count, size_px) - begin)};
+  return {first, range.count};
 }
 
 /// How far the middle of the box's projection has moved since the nominal pose.
@@ -118,7 +117,7 @@ std::vector<View> views_at(const RegistrationProblem& problem, const RigidTransf
   std::vector<View> views;
   views.reserve(problem.views.size());
   for (const RegistrationView& view : problem.views)
-    views.push_back({view.view.camera, region_at(problem, view, room_from_ct)});
+    views.push_back(View{view.view.camera, region_at(problem, view, room_from_ct)}.scaled(1.0));
   return views;
 }
 

@@ -36,18 +36,18 @@ RegionOfInterest target_region_about(const ProjectedBox& box,
                                      bool is_nominal_stated);
 
 /// Where a view looks at a pose: its target_region, moved as the middle of the box's projection has
-/// moved since the nominal pose, by multiples of `step_px` along columns and rows, and cut at the
-/// detector's edges; view.roi when it has none. Only the place follows: a box that turns by 10
-/// degrees is seen up to a sixth wider, which the margins hold, and a region that keeps its size
-/// compares the same number of pixels everywhere. Its middle stays on the detector; it stays where
-/// it is at the nominal pose when a corner of the box lies behind the source.
-/// \test TargetRegion.FollowsTheBoxInEveryView
+/// moved since the nominal pose, by multiples of `step_px` along columns and rows; view.roi when it
+/// has none. It may reach beyond the detector: View::scaled() cuts it. Only the place follows: a
+/// box that turns by 10 degrees is seen up to a sixth wider, which the margins hold, and a region
+/// that keeps its size compares the same number of pixels everywhere. Its middle stays on the
+/// detector; it stays where it is at the nominal pose when a corner of the box lies behind the
+/// source. \test TargetRegion.FollowsTheBoxInEveryView
 RegionOfInterest region_at(const RegistrationProblem& problem,
                            const RegistrationView& view,
                            const RigidTransform& room_from_ct,
                            int step_px = 1);
 
-/// All views with their regions at a pose.
+/// All views with their regions at a pose, cut at the detectors' edges.
 std::vector<View> views_at(const RegistrationProblem& problem, const RigidTransform& room_from_ct);
 
 }  // namespace af::registration

@@ -94,7 +94,8 @@ std::vector<ViewValue> PoseExaminer::view_values(const RigidTransform& room_from
     if (!view) continue;
     value.coarse = share_of(view->stages[kCoarse].value_at(*problem_, room_from_ct));
     value.fine = share_of(view->stages[kFine].value_at(*problem_, room_from_ct));
-    if (!with_backgrounds) continue;
+    // Where the pose cannot be valued, the stage looks somewhere else.
+    if (!with_backgrounds || !std::isfinite(value.fine)) continue;
     for (const double part : {1.0, 0.5, 0.25}) {
       value.background = share_beside(room_from_ct, part * kBackgroundDistanceMm, *view);
       if (std::isfinite(value.background)) break;

@@ -545,7 +545,7 @@ Judgement judgement_of(const RegistrationRecord& record) {
   const auto failure = failure_of(result.stop_reason);
   Judgement judgement = failure.has_value()
                             ? Judgement{Verdict::NotFound, *failure}
-                            : judged_confidence(record.uncertainty, record.view_values.size());
+                            : judged_confidence(record.uncertainty, record.view_values);
   // Whatever leaves a doubt, however high the confidence is, belongs to these.
   std::vector<std::string> reasons = record.diagnosis.messages;
   if (!failure.has_value())

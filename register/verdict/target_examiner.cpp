@@ -87,6 +87,7 @@ std::optional<TargetAlone> target_alone(const RegistrationProblem& whole,
     seen.view.roi = *region;
     seen.target_region.reset();
     seen.limit.reset();
+    if (!seen.drr_range) seen.drr_range = drr_range_of(whole, view);
     const auto level = static_cast<std::size_t>(alone.stage.level);
     auto& renderer = level == 0 ? seen.renderer : seen.coarse_levels[level - 1].renderer;
     alone.drrs.push_back(std::make_shared<PartMotionDrr>(renderer, view.target_casts[level]));

@@ -90,15 +90,17 @@ std::vector<std::string> doubts_of(const RegistrationResult& result,
   return doubts;
 }
 
-Judgement judged_confidence(const UncertaintyReport& report, std::size_t views) {
+Judgement judged_confidence(const UncertaintyReport& report, std::span<const ViewValue> values) {
   if (!std::isfinite(report.confidence))
     return {Verdict::Doubtful,
             "how probably it is right is not known: no X-ray has gradients to judge the pose by, "
             "or the field holds no pose beside it to compare with"};
-  // 0: there is no end.
-  const bool is_bound = !std::isfinite(report.tre_rms_mm) && report.confidence > 0.0;
+  const bool has_one_view = values.size() == 1;
+  // The confidence of one view looks at no TRE. 0: there is no end.
+  const bool needs_tre = !has_one_view || values.front().in_silhouette;
+  const bool is_bound = needs_tre && !std::isfinite(report.tre_rms_mm) && report.confidence > 0.0;
   const std::string right = std::string("right with ") + (is_bound ? "at least " : "") +
-                            percent_text(report.confidence) + (views == 1 ? " (mRPD" : " (TRE") +
+                            percent_text(report.confidence) + (has_one_view ? " (mRPD" : " (TRE") +
                             " below 2.5 mm), at least ";
   if (report.confidence < kLeastConfidence && !is_bound)
     return {Verdict::NotFound, right + percent_text(kLeastConfidence) + " wanted"};

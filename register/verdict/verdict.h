@@ -79,7 +79,7 @@ std::vector<std::string> doubts_of(const RegistrationResult& result,
 
 /// The verdict by the probability that the end is right, UncertaintyReport::confidence. Where no
 /// TRE is predicted, the confidence is a lower bound, by which nothing is rejected.
-Judgement judged_confidence(const UncertaintyReport& report, std::size_t views);
+Judgement judged_confidence(const UncertaintyReport& report, std::span<const ViewValue> values);
 
 /// What one view leaves open of a pose that it shows: "depth along the beam within 24 mm", rounded
 /// up; NaN: not known.

@@ -47,13 +47,17 @@ TEST(AttenuationVolume, APartHoldsTheVoxelsOfItsBox) {
   const CtVolume ct = box_phantom(grid_of(20, 10, 8), {4, 3, 2}, {9, 6, 5}, 500);
   const AttenuationVolume volume(ct, {});
   // From between voxels 5 and 6 along i, beyond the volume along j, to voxel 4 itself along k.
-  const VolumePart part =
-      part_within(volume, {ct.grid.point_mm({5.5, -3.0, 3.0}), ct.grid.point_mm({8.2, 40.0, 4.0})});
+  const CtBox box{ct.grid.point_mm({5.5, -3.0, 3.0}), ct.grid.point_mm({8.2, 40.0, 4.0})};
+  const VolumePart part = part_within(volume, box);
   EXPECT_EQ(part.grid.size, (std::array<int, 3>{3 + 2, 4 + 2, 2 + 2}));
   EXPECT_TRUE(part.grid.point_mm({1, 1, 1}).isApprox(ct.grid.point_mm({6, 3, 3})));
   EXPECT_EQ(std::count(part.voxels.begin(), part.voxels.end(), 1500), 3 * 4 * 2);
   EXPECT_EQ(std::count(part.voxels.begin(), part.voxels.end(), 0),
             std::ssize(part.voxels) - 3 * 4 * 2);
+  // Of the CT it reaches into the air about the volume.
+  const VolumePart of_ct = part_within(ct, {}, box);
+  EXPECT_EQ(of_ct.grid.size, (std::array<int, 3>{3 + 2, 10 + 2, 2 + 2}));
+  EXPECT_EQ(std::count(of_ct.voxels.begin(), of_ct.voxels.end(), 1500), 3 * 4 * 2);
   EXPECT_TRUE(part_within(volume, {{500, 500, 500}, {510, 510, 510}}).voxels.empty());
 }
 

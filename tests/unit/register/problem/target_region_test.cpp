@@ -73,12 +73,13 @@ TEST(TargetRegion, FollowsTheBoxInEveryView) {
   EXPECT_EQ(views[1].roi, (RegionOfInterest{16, 9, 16, 15}));
 }
 
-TEST(TargetRegion, IsCutAtTheDetectorsEdgesAndItsMiddleStaysOnIt) {
+TEST(TargetRegion, ReachesBeyondTheDetectorButItsMiddleStaysOnIt) {
   const RegistrationProblem wide = problem_with({6, 6, 36, 36});
-  EXPECT_EQ(regions_of(wide, moved_by(15, 0, 15)), (Regions{{14, 0, 34, 34}, {6, 0, 36, 34}}));
+  EXPECT_EQ(regions_of(wide, moved_by(15, 0, 15)), (Regions{{14, -2, 36, 36}, {6, -2, 36, 36}}));
+  EXPECT_EQ(views_at(wide, moved_by(15, 0, 15))[0].roi, (RegionOfInterest{14, 0, 34, 34}));
   const RegistrationProblem small = problem_with({16, 16, 16, 16});
-  EXPECT_EQ(regions_of(small, moved_by(300, 0, 0))[0], (RegionOfInterest{40, 16, 8, 16}));
-  EXPECT_EQ(regions_of(small, moved_by(-300, 0, 0))[0], (RegionOfInterest{0, 16, 8, 16}));
+  EXPECT_EQ(regions_of(small, moved_by(300, 0, 0))[0], (RegionOfInterest{40, 16, 16, 16}));
+  EXPECT_EQ(regions_of(small, moved_by(-300, 0, 0))[0], (RegionOfInterest{-8, 16, 16, 16}));
   EXPECT_EQ(regions_of(small, moved_by(0, -640, 0))[0], (RegionOfInterest{16, 16, 16, 16}))
       << "behind the source";
 }
