@@ -361,7 +361,7 @@ KnownCt read_known(const StudyCase& study_case,
         study_case.ct,
         study_case.ct_reading,
         options.attenuation,
-        options.judging_level > 0 ? std::optional(study_case.target_box_ct) : std::nullopt,
+        asks_target(options) ? std::optional(study_case.target_box_ct) : std::nullopt,
         warnings);
   });
   return naming_study_line(
@@ -398,6 +398,30 @@ void add_target_casts(VolumePart box, const AttenuationModel& model, Registratio
           blurred_volume(*target, sigma_mm),
           RayCasterOptions{std::max(RayCasterOptions().step_mm, 0.5 * sigma_mm)});
     view.target_casts.push_back(blurred);
+  }
+}
+
+/// Lets the views' regions follow the target box. One that lies partly behind a source leaves the
+/// region of that view in its place.
+void follow_target(const StudyCase& study_case,
+                   RegistrationProblem& problem,
+                   std::vector<std::string>& warnings) {
+  for (std::size_t i = 0; i < problem.views.size(); ++i) {
+    RegistrationView& view = problem.views[i];
+    const CameraGeometry& camera = view.view.camera;
+    const auto box = projected_box(study_case.target_box_ct, problem.nominal_room_from_ct, camera);
+    if (!box.has_value()) continue;
+    std::optional<RegionOfInterest> stated;
+    if (study_case.views[i].is_roi_stated) stated = view.view.roi;
+    view.target_region = target_region_about(*box, stated, study_case.is_nominal_stated);
+    const Eigen::Vector2d size_px = box->high_px - box->low_px;
+    if ((size_px.array() > camera.size_px.array().cast<double>()).any())
+      warnings.push_back(
+          "target_box_ct_mm: at the nominal pose the target box is wider or higher "
+          "than the beam of camera '" +
+          camera.name + "': " + fixed_text(size_px.x(), 0) + " x " + fixed_text(size_px.y(), 0) +
+          " pixels of " + std::to_string(camera.size_px.x()) + " x " +
+          std::to_string(camera.size_px.y()) + "; what lies beyond the detector is not compared");
   }
 }
 

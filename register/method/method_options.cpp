@@ -131,7 +131,13 @@ RegistrationOptions resolve(const MethodOptions& options) {
     if (options.smoothing_sigma_mm.has_value() && !chain.stages.empty())
       chain.stages.front().smoothing_sigma_mm = *options.smoothing_sigma_mm;
   if (options.max_evaluations.has_value()) result.max_evaluations = *options.max_evaluations;
-  if (options.region.has_value()) result.region_follows_target = *options.region == kRegionOfTarget;
+  if (options.region.has_value()) {
+    if (*options.region != kRegionOfTarget && *options.region != kRegionOfStudy)
+      throw InputError("region",
+                       "'" + *options.region + "'",
+                       std::string("must be ") + kRegionOfTarget + " or " + kRegionOfStudy);
+    result.region_follows_target = *options.region == kRegionOfTarget;
+  }
   result.seed = options.seed;
   std::vector<std::string> found = problems(result);
   if (options.judge_enough_value.has_value() && result.chains.size() < 2)

@@ -61,8 +61,10 @@ TEST(Judgement, SaysTheProbabilityAndWhatWasWanted) {
   // Rounded down: 99.0 % would be found.
   EXPECT_EQ(reason(0.98999), "right with 98.9 % (TRE below 2.5 mm), at least 99.0 % wanted");
   EXPECT_EQ(reason(0.012), "right with 1.2 % (TRE below 2.5 mm), at least 5.0 % wanted");
-  EXPECT_EQ(judgement_of(record_with(0.9968, {{0.9, 0.9}})).reason,
-            "right with 99.6 % (mRPD below 2.5 mm), at least 99.0 % wanted");
+  EXPECT_EQ(
+      judgement_of(record_with(0.9968, {{0.9, 0.9}})).reason,
+      "right with 99.6 % (mRPD below 2.5 mm), at least 99.0 % wanted; depth along the beam not "
+      "known");
 }
 
 // Without it the confidence is a lower bound.
