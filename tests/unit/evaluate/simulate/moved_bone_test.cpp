@@ -42,7 +42,7 @@ std::vector<Subject> subjects() {
 constexpr std::int64_t kPatient = 4;
 const Vector3d source_point(420.0, -640.0, 35.0);
 
-const TissueModel& tissue() {
+const TissueModel& patient_tissue() {
   static const TissueModel model{AttenuationModel()};
   return model;
 }
@@ -109,8 +109,8 @@ class EveryMovedBone : public ::testing::TestWithParam<Subject> {
 };
 
 TEST_P(EveryMovedBone, DiffersWithinItsShadowsAndNowhereElse) {
-  const SolidProjector before(still_, tissue());
-  const SolidProjector after(moved_, tissue());
+  const SolidProjector before(still_, patient_tissue());
+  const SolidProjector after(moved_, patient_tissue());
   const Phantom old_bodies = alone(still_, bone_);
   const Phantom new_bodies = alone(moved_, bone_);
   int differ = 0;
@@ -141,8 +141,8 @@ TEST_P(EveryMovedBone, IsSeenByARayWhereItsPoseSaysIt) {
   Phantom new_bodies = alone(moved_, bone_);
   for (Phantom* bodies : {&old_bodies, &new_bodies})  // no faces
     bodies->half_sizes_mm = Vector3d::Constant(500.0);
-  const SolidProjector before(old_bodies, tissue());
-  const SolidProjector after(new_bodies, tissue());
+  const SolidProjector before(old_bodies, patient_tissue());
+  const SolidProjector after(new_bodies, patient_tissue());
   const RigidTransform bone_from_rest = rest_from_bone_.inverse();
   int differ = 0;
   for (const Vector3d& through : screen(bone_of(still_, bone_))) {
