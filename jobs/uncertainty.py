@@ -26,7 +26,7 @@ LEAST_EXCESS = 0.02
 
 # What is read of a table of registrations.
 COLUMNS = ["case", "tre_mm", "mrpd_mm", "judge_fine_mean", "judge_excess", "covariance_inflation", "tre_inflation", "squared_distance",
-           "predicted_tre_rms_mm", "predicted_tre_95_mm", "confidence"]
+           "sandwich_tre_mm", "predicted_tre_95_mm", "confidence"]
 
 
 class Row:
@@ -53,7 +53,7 @@ class Row:
         self.distance = number("squared_distance") * inflation  # by the sandwich alone
         tre_inflation = number("tre_inflation")
         scale = 1.0 / math.sqrt(tre_inflation) if tre_inflation > 0 else math.nan
-        self.tre_rms = number("predicted_tre_rms_mm") * scale
+        self.tre_rms = number("sandwich_tre_mm")
         self.tre_95 = number("predicted_tre_95_mm") * scale
         self.has_pose = not math.isnan(self.fine_mean)
         self.has_confidence = self.has_pose and not math.isnan(self.excess)

@@ -132,7 +132,7 @@ json statistics_of(const RowPointers& rows, const StatisticsOptions& options) {
   result["error_of_successes_mm"] = to_json(summarize(values_of(successful, error_mm)));
   result["depth_of_all_mm"] = summary_of_all(values_of(of_one_view(rows), depth_mm));
   result["depth_of_successes_mm"] =
-      to_json(summarize(values_of(of_one_view(successful), depth_mm)));
+      to_json(summarize(finite_values_of(of_one_view(successful), depth_mm)));
   result["bias"] = bias_json(successful);
   result["errors_of_successes"] = errors_json(
       [&](const auto& error) { return to_json(summarize(finite_values_of(successful, error))); });

@@ -58,6 +58,7 @@ CsvCells judge_cells(const JudgeSummary& judge) {
 CsvCells uncertainty_cells(const UncertaintyReport& report, double chain_distance_mm) {
   CsvCells cells = {{"predicted_tre_rms_mm", report.tre_rms_mm},
                     {"predicted_tre_95_mm", report.tre_95_mm},
+                    {"sandwich_tre_mm", report.sandwich_tre_mm},
                     {"predicted_depth_95_mm", report.depth_95_mm},
                     {"target_share", report.target.share},
                     {"target_apart_mm", report.target.apart_mm},

@@ -166,6 +166,7 @@ json uncertainty_json(const RegistrationRecord& record) {
           {"tre_inflation", number_or_null(report.tre_inflation)},
           {"tre_rms_mm", number_or_null(report.tre_rms_mm)},
           {"tre_95_mm", number_or_null(report.tre_95_mm)},
+          {"sandwich_tre_mm", number_or_null(report.sandwich_tre_mm)},
           {"depth_95_mm", number_or_null(report.depth_95_mm)},
           {"target_share", number_or_null(report.target.share)},
           {"target_apart_mm", number_or_null(report.target.apart_mm)},

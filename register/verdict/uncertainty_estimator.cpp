@@ -137,11 +137,10 @@ double UncertaintyEstimator::add_covariance(const RegistrationResult& result,
 UncertaintyReport UncertaintyEstimator::report(const RegistrationResult& result,
                                                std::span<const ViewValue> view_values) {
   UncertaintyReport report;
-  double sandwich_tre_mm = UncertaintyReport::kNone;
   if (result.has_pose() && !ends_.empty())
-    sandwich_tre_mm = add_covariance(result, view_values, report);
+    report.sandwich_tre_mm = add_covariance(result, view_values, report);
   const bool has_end = result.has_pose() && !failure_of(result.stop_reason).has_value();
-  report.confidence = has_end ? success_confidence({view_values, sandwich_tre_mm}) : 0.0;
+  report.confidence = has_end ? success_confidence({view_values, report.sandwich_tre_mm}) : 0.0;
   return report;
 }
 

@@ -21,7 +21,8 @@ struct UncertaintyReport {
   /// room's axes, where p is the ROI centre at the found pose.
   std::array<double, kCovarianceSize> covariance_deg_mm = filled_with_nan();
   double tre_rms_mm = kNone;  ///< the root of the expected mean squared TRE over the target box
-  double tre_95_mm = kNone;   ///< the TRE is below this with probability 0.95
+  double sandwich_tre_mm = kNone;  ///< rms, of the sandwich alone: what the confidence looks at
+  double tre_95_mm = kNone;        ///< the TRE is below this with probability 0.95
   /// With one view: the target's centre lies within this, to either side, along the beam with
   /// probability 0.95.
   double depth_95_mm = kNone;
@@ -35,6 +36,7 @@ struct UncertaintyReport {
   auto members() {
     return std::tie(covariance_deg_mm,
                     tre_rms_mm,
+                    sandwich_tre_mm,
                     tre_95_mm,
                     depth_95_mm,
                     target,

@@ -201,7 +201,8 @@ of_study 3 'nominal_room_from_ct' 'pose not rigid' "$(edited study.toml 's/^nomi
 of_study 3 'roi_px' 'ROI off the detector' "$(edited study.toml '0,/^roi_px = .*/s//roi_px = [40, 40, 20, 20]/')"
 of_study 3 'target_box_ct_mm' 'target box to 1e308' "$(edited study.toml 's/^target_box_ct_mm = .*/target_box_ct_mm = [[-1e308,0,0],[1,1,1]]/')"
 of_study 3 'each within +-1e+06' 'pose 1e300 mm away' "$(edited study.toml 's/^nominal_room_from_ct = .*/nominal_room_from_ct = [[1,0,0,1e300],[0,1,0,0],[0,0,1,0],[0,0,0,1]]/')"
-of_study 3 'must vary' 'ROI of one pixel at the corner' "$(edited study.toml 's/^roi_px = .*/roi_px = [47, 47, 1, 1]/')"
+row 3 'must vary' 'ROI of one pixel at the corner, kept' "$bin/af-register" --renderer raycast --region study -o out/result \
+  --study "$(edited study.toml 's/^roi_px = .*/roi_px = [47, 47, 1, 1]/')"
 of_study 3 'roi_px' 'ROI of huge numbers' "$(edited study.toml '0,/^roi_px = .*/s//roi_px = [2147483647, 0, 2147483647, 1]/')"
 of_study 3 'collinear' 'collinear fiducials' "$(edited study.toml 's/^name = .*/&\nfiducials_ct_mm = [[0,0,0],[1,1,1],[2,2,2],[3,3,3]]/; s/^roi_px = .*/&\nfiducials_px = [[10,10],[20,20],[30,30],[40,41]]/')"
 # marked KEY-OF-THE-CASE KEYS-OF-ITS-VIEWS: the valid study with points that somebody marked.

@@ -618,7 +618,7 @@ TEST(PairedStatistics, WeighPatientsAlikeHoweverManyPairsTheyHave) {
 
 TEST(PairedStatistics, TieInEveryPairAtOnceIsEquivalenceWithoutSpread) {
   Rows rows;
-  for (std::int64_t i = 0; i < 3; ++i) {
+  for (std::int64_t i = 0; i < 10; ++i) {
     rows.push_back(row("field", i, 1, 0.5));
     rows.push_back(row("raycast", i, 1, 0.5));
   }

@@ -162,14 +162,14 @@ TEST(ResultFiles, ARunOfSeveralStartsLeavesATableAndTheBestResult) {
   EXPECT_EQ(summary.find("verdict     doubtful: "), 0U) << summary;
   EXPECT_NE(summary.find("0 found, 2 doubtful, 0 not found"), std::string::npos) << summary;
   EXPECT_NE(summary.find("highest similarity: start 1"), std::string::npos) << summary;
+  EXPECT_EQ(CsvTable::read(folder / "registrations.csv").row_count(), 2U);
+  EXPECT_NE(read_text_file(folder / "result.json").find("\"start_index\": 1"), std::string::npos);
   // Verdict and probability are one sentence, and the only one that speaks of either.
   const std::string found =
       write_run({judged_record(0, 1.0, 0.995)}, *small.problem, some_run(), folder.path());
   EXPECT_EQ(found.find("verdict     found: right with 99.5 % (TRE below 2.5 mm), "), 0U) << found;
   EXPECT_NE(found.find("uncertain   if it is right, TRE below 0.50 mm"), std::string::npos);
   EXPECT_EQ(found.find("99.5 %"), found.rfind("99.5 %")) << found;
-  EXPECT_EQ(CsvTable::read(folder / "registrations.csv").row_count(), 2U);
-  EXPECT_NE(read_text_file(folder / "result.json").find("\"start_index\": 1"), std::string::npos);
 }
 
 }  // namespace
