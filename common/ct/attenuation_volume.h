@@ -84,7 +84,8 @@ struct VolumePart {
 };
 
 /// The voxels between the first and the last index, along each axis of the grid, that a box of the
-/// ct frame reaches; the same of a CT and of its attenuation. \test AttenuationVolume.APartHoldsTheVoxelsOfItsBox
+/// ct frame reaches; the same of a CT and of its attenuation. \test
+/// AttenuationVolume.APartHoldsTheVoxelsOfItsBox
 VolumePart part_within(const AttenuationVolume& volume, const CtBox& box_ct);
 VolumePart part_within(const CtVolume& ct, const AttenuationModel& model, const CtBox& box_ct);
 

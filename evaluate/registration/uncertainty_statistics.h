@@ -15,9 +15,9 @@ namespace af::evaluation {
 /// median error lies inside its 95 % region, by pose (Mahalanobis) and by TRE
 /// (`predicted_tre_95_mm`, and the gold standard's own), with intervals over patients: starts of
 /// one case share its X-rays and most of their error. Of rows the area under the ROC curve of
-/// confidence, right ends against others; for some confidences the shares of both that have at least
-/// so much; and how many of both have each verdict. null when no row has a confidence. docs/uncertainty.md defines each.
-/// \test RegistrationStatistics.CountCoverageOverCases
+/// confidence, right ends against others; for some confidences the shares of both that have at
+/// least so much; and how many of both have each verdict. null when no row has a confidence.
+/// docs/uncertainty.md defines each. \test RegistrationStatistics.CountCoverageOverCases
 nlohmann::json uncertainty_statistics(const std::map<std::string, RowPointers>& by_case,
                                       const StatisticsOptions& options);
 

@@ -291,9 +291,9 @@ RegistrationRow sure_row(double tre_mm,
 
 TEST(RegistrationStatistics, SayWhetherRegistrationsKnowTheirErrors) {
   Rows rows = {sure_row(0.5, 3.0, 0.99, "a"),
-                     sure_row(0.9, 12.0, 0.95, "b"),
-                     sure_row(1.5, 13.0, 0.6, "c"),
-                     sure_row(8.0, 900.0, 0.7, "c")};
+               sure_row(0.9, 12.0, 0.95, "b"),
+               sure_row(1.5, 13.0, 0.6, "c"),
+               sure_row(8.0, 900.0, 0.7, "c")};
   rows[0].verdict = "found";
   rows[1].verdict = rows[3].verdict = "doubtful";
   const json found = renderer_statistics(rows, "field", {1})["uncertainty"];
