@@ -552,9 +552,12 @@ Judgement judgement_of(const RegistrationRecord& record) {
     for (const std::string& doubt :
          doubts_of(result, record.view_values, record.uncertainty.target))
       reasons.push_back(doubt);
-  if (!reasons.empty() && judgement.verdict == Verdict::Found)
+  if (!reasons.empty() && judgement.verdict == Verdict::Found) {
     judgement.verdict = Verdict::Doubtful;
-  reasons.insert(reasons.begin(), judgement.reason);
+    reasons.push_back("but for that " + judgement.reason);
+  } else {
+    reasons.insert(reasons.begin(), judgement.reason);
+  }
   if (record.view_values.size() == 1 && judgement.verdict != Verdict::NotFound)
     reasons.push_back(depth_text(record.uncertainty.depth_95_mm));
   if (!result.clipped_along.empty())

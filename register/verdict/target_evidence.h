@@ -14,15 +14,14 @@ struct TargetEvidence {
   /// Of what the pose explains of the X-rays' gradients about the target's shadow: the part that is
   /// lost without the target. 0: the rest explains as much.
   double share = kNone;
-  /// How far from the pose the target alone fits best: the mean way of its points across the beam,
-  /// mm at the isocentre, in the view that shows it most.
+  /// How far from the pose the target alone fits best: the mean displacement of its points across
+  /// the beam, mm at the isocentre, in the view that shows it most.
   double apart_mm = kNone;
 
   auto members() { return std::tie(share, apart_mm); }
 };
 
-/// Targets of rigid patients fitted within 0.1 mm on clean X-rays and 0.4 mm under every stress;
-/// those of bones moved by 2 to 6 mm 1.2 to 3.8 mm away (docs/uncertainty.md).
+/// Targets of rigid patients fit within 0.4 mm, bones that moved by 2 to 6 mm at least 1.1 mm away.
 inline constexpr double kTargetApartMm = 0.75;
 
 /// A target with less than this share shows next to nothing of its own.

@@ -18,7 +18,7 @@
 namespace af::registration {
 namespace {
 
-/// About the target's shadow, at the isocentre: room for the way that it may have moved.
+/// About the target's shadow, at the isocentre: room for a target that has moved.
 constexpr double kMarginMm = 5.0;
 /// The widest pixels to compare, there. Coarser ones would miss small bones.
 constexpr double kPixelMm = 1.5;
@@ -96,7 +96,7 @@ std::optional<TargetAlone> target_alone(const RegistrationProblem& whole,
   return alone;
 }
 
-/// The mean way of the target's points across the beam, in the view that shows it most.
+/// The mean displacement of the target's points across the beam, in the view that shows it most.
 double across_mm(const RegistrationProblem& problem,
                  std::span<const Eigen::Vector3d> points_ct,
                  const RigidTransform& to_room_from_ct) {

@@ -11,8 +11,8 @@
 namespace af::registration {
 
 /// Asks the target of a case about poses: DRRs in which it alone moves (PartMotionDrr) are compared
-/// with the X-rays about its shadow, by the measure of portfolios' judge. Without this, a pose that
-/// fits everything but a bone that moved is taken for that bone's. For one thread at a time.
+/// with the X-rays about its shadow, by the measure of portfolios' judge. It tells a pose that fits
+/// everything but a bone that has moved. For one thread at a time.
 /// \test TargetExaminer.TellsHowFarTheTargetMovedAgainstTheRest
 class TargetExaminer {
  public:

@@ -538,7 +538,7 @@ TEST_F(RegisterProgram, AnEndWhereTheFieldsRangeEndsIsDoubtfulAndSaysAlongWhat) 
 TEST_F(RegisterProgram, RequireFoundDoesNotAcceptADoubtfulPose) {
   const std::string arguments = fields() + " --preset fast --start-rotation-deg -1,0.5,2.5 ";
   const std::string cut_short = arguments + "--max-evaluations 14 -o " + path("cut-short");
-  expect_refused(run_register(cut_short), 0, "verdict     doubtful: right with ");
+  expect_refused(run_register(cut_short), 0, "verdict     doubtful: the search was not finished");
   expect_refused(run_register(cut_short + " --require-found"), 7, "the pose is doubtful");
   EXPECT_EQ(result("cut-short").at("verdict"), "doubtful");
   EXPECT_TRUE(fs::exists(path("cut-short/pose.toml")));

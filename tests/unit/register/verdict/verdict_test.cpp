@@ -91,9 +91,11 @@ TEST(Judgement, ATargetThatDisagreesWithItsSurroundingsIsDoubtful) {
   EXPECT_EQ(verdict_of(record_of(0.01, {0.7, 3.5})), Verdict::NotFound);
   EXPECT_EQ(verdict_of(record_of(0.9968, {0.04, 0.0})), Verdict::Doubtful);
   EXPECT_EQ(verdict_of(record_of(0.9968, {})), Verdict::Found) << "it was not asked";
-  EXPECT_THAT(judgement_of(record_of(0.9968, {0.7, 3.42})).reason,
-              testing::EndsWith("the target disagrees with its surroundings: by itself it fits 3.5 "
-                                "mm from here; it may have moved against the rest"));
+  EXPECT_EQ(
+      judgement_of(record_of(0.9968, {0.7, 3.42})).reason,
+      "the target disagrees with its surroundings: by itself it fits 3.5 mm from here; it may "
+      "have moved against the rest; but for that right with 99.6 % (TRE below 2.5 mm), at "
+      "least 99.0 % wanted");
 }
 
 TEST(Judgement, OfOneViewSaysWhatIsNotKnown) {
@@ -135,16 +137,21 @@ TEST(Judgement, WhatWasNotSearchedIsNotFoundWhateverItsValue) {
 }
 
 TEST(Judgement, SaysWhereTheRangeEndsAndWhereTheStartWasClipped) {
-  const std::string probability = "right with 99.5 % (TRE below 2.5 mm), at least 99.0 % wanted; ";
+  const std::string probability = "right with 99.5 % (TRE below 2.5 mm), at least 99.0 % wanted";
   RegistrationRecord record = record_with(0.9951);
   record.result.stop_reason = StopReason::PinnedAtLimit;
   record.result.pinned_along = "rx, rz, tx";
   const std::string ends =
       "the field's range ends here along rx, rz, tx: the optimum may lie outside";
-  EXPECT_EQ(judgement_of(record).reason, probability + ends);
+  EXPECT_EQ(judgement_of(record).reason, ends + "; but for that " + probability);
   // What a diagnosis finds does not replace it.
   record.diagnosis.messages = {"view 'B' does not agree"};
-  EXPECT_EQ(judgement_of(record).reason, probability + "view 'B' does not agree; " + ends);
+  EXPECT_EQ(judgement_of(record).reason,
+            "view 'B' does not agree; " + ends + "; but for that " + probability);
+  // Where the probability leaves the doubt, it comes first.
+  record.uncertainty.confidence = 0.5;
+  EXPECT_EQ(judgement_of(record).reason.find("right with 50.0 % "), 0U);
+  record.uncertainty.confidence = 0.9951;
   EXPECT_EQ(verdict_of(record), Verdict::Doubtful);
   record.result = RegistrationResult();
   EXPECT_EQ(verdict_of(record), Verdict::Doubtful) << "what a diagnosis finds is enough";
@@ -153,7 +160,7 @@ TEST(Judgement, SaysWhereTheRangeEndsAndWhereTheStartWasClipped) {
   EXPECT_EQ(verdict_of(record), Verdict::Found);
   EXPECT_EQ(
       judgement_of(record).reason,
-      probability + "the start lay outside the field's range along ry and was clipped into it");
+      probability + "; the start lay outside the field's range along ry and was clipped into it");
 }
 
 TEST(Judgement, AViewThatCannotBeJudgedLeavesADoubt) {
