@@ -21,7 +21,7 @@ struct TargetEvidence {
   auto members() { return std::tie(share, apart_mm); }
 };
 
-/// Targets of rigid patients fit within 0.4 mm, bones that moved by 2 to 6 mm at least 1.1 mm away.
+/// Targets of rigid patients fit within 0.6 mm, bones that moved by 2 to 6 mm at least 1.1 mm away.
 inline constexpr double kTargetApartMm = 0.75;
 
 /// A target with less than this share shows next to nothing of its own.

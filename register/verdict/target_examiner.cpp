@@ -20,7 +20,7 @@ namespace {
 
 /// About the target's shadow, at the isocentre: room for a target that has moved.
 constexpr double kMarginMm = 5.0;
-/// The widest pixels to compare, there. Coarser ones would miss small bones.
+/// Of a side of the pixels to compare, there.
 constexpr double kPixelMm = 1.5;
 /// Level 0 would see every node of a field.
 constexpr int kLevel = 1;
@@ -64,7 +64,7 @@ StageOptions stage_for(const RegistrationProblem& problem) {
                             static_cast<int>(view.coarse_levels.size()),
                             static_cast<int>(view.target_casts.size()) - 1});
   }
-  stage.pixel_step = std::max(1, static_cast<int>(kPixelMm * px_per_mm));
+  stage.pixel_step = std::max(1, static_cast<int>(std::lround(kPixelMm * px_per_mm)));
   return stage;
 }
 
@@ -98,18 +98,18 @@ std::optional<TargetAlone> target_alone(const RegistrationProblem& whole,
 
 /// The mean displacement of the target's points across the beam, in the view that shows it most.
 double across_mm(const RegistrationProblem& problem,
-                 std::span<const Eigen::Vector3d> points_ct,
+                 const RigidTransform& from_room_from_ct,
                  const RigidTransform& to_room_from_ct) {
   double most_mm = 0.0;
   for (const RegistrationView& view : problem.views) {
     const CameraGeometry& camera = view.view.camera;
     double sum_px = 0.0;
-    for (const Eigen::Vector3d& point : points_ct)
-      sum_px += (camera.project(to_room_from_ct * point) -
-                 camera.project(problem.nominal_room_from_ct * point))
-                    .norm();
+    for (const Eigen::Vector3d& point : problem.target_points_ct)
+      sum_px +=
+          (camera.project(to_room_from_ct * point) - camera.project(from_room_from_ct * point))
+              .norm();
     most_mm = std::max(most_mm,
-                       sum_px / static_cast<double>(points_ct.size()) /
+                       sum_px / static_cast<double>(problem.target_points_ct.size()) /
                            camera.pixels_per_mm(problem.isocenter_point));
   }
   return most_mm;
@@ -124,23 +124,39 @@ double value_without_target(MultiViewObjective& objective, const RigidTransform&
   return objective.evaluate(away).similarity;
 }
 
-TargetEvidence evidence_of(PreparedStage& stage, const TargetAlone& alone) {
+std::optional<TargetAnswer> answer_of(PreparedStage& stage, const TargetAlone& alone) {
   const RigidTransform& pose = alone.problem.nominal_room_from_ct;
   for (std::size_t i = 0; i < alone.drrs.size(); ++i)
-    if (!alone.drrs[i]->hold(pose, stage.objective.views()[i].view).is_inside()) return {};
-  std::vector<View> views;
-  for (const RegistrationView& view : alone.problem.views) views.push_back(view.view);
-  const std::vector<Eigen::Vector3d>& points_ct = alone.problem.scaling_points_ct;
-  const auto scaling = projected_motion_scaling(
-      pose, alone.problem.center_ct_mm, points_ct, views, alone.problem.isocenter_point);
-  if (!scaling) return {};
+    if (!alone.drrs[i]->hold(pose, stage.objective.views()[i].view).is_inside())
+      return std::nullopt;
+  const auto scaling = projected_motion_scaling(pose,
+                                                alone.problem.center_ct_mm,
+                                                alone.problem.scaling_points_ct,
+                                                views_at(alone.problem, pose),
+                                                alone.problem.isocenter_point);
+  if (!scaling) return std::nullopt;
   PoseTarget target(stage.objective, PoseFrame::about(pose, alone.problem.center_ct_mm), *scaling);
   const double with_target = stage.objective.evaluate(pose).similarity;
   const double without_target = value_without_target(stage.objective, pose);
   OptimizerResult found;
   stage.optimizer->maximize(target, stage.options.search, {kMostEvaluations, 0}, found);
-  return {with_target > 0.0 ? std::max(0.0, 1.0 - without_target / with_target) : 0.0,
-          across_mm(alone.problem, points_ct, target.pose(found.point))};
+  return TargetAnswer{with_target > 0.0 ? std::max(0.0, 1.0 - without_target / with_target) : 0.0,
+                      target.pose(found.point)};
+}
+
+std::optional<TargetAnswer> answer_at(const RegistrationProblem& whole,
+                                      const RigidTransform& room_from_ct,
+                                      const std::shared_ptr<ThreadPool>& threads) {
+  const std::optional<TargetAlone> alone = target_alone(whole, room_from_ct);
+  if (!alone) return std::nullopt;
+  try {
+    std::vector<PreparedStage> stages =
+        prepared_stages(alone->problem, alone->problem.views, {&alone->stage, 1}, threads);
+    return answer_of(stages.front(), *alone);
+  } catch (const InputError&) {
+    // The X-ray has no gradients over most of the shadow.
+    return std::nullopt;
+  }
 }
 
 }  // namespace
@@ -149,17 +165,27 @@ TargetExaminer::TargetExaminer(std::shared_ptr<const RegistrationProblem> proble
                                std::shared_ptr<ThreadPool> threads)
     : problem_(std::move(problem)), threads_(std::move(threads)) {}
 
-TargetEvidence TargetExaminer::evidence(const RigidTransform& room_from_ct) const {
-  const std::optional<TargetAlone> alone = target_alone(*problem_, room_from_ct);
-  if (!alone) return {};
-  try {
-    std::vector<PreparedStage> stages =
-        prepared_stages(alone->problem, alone->problem.views, {&alone->stage, 1}, threads_);
-    return evidence_of(stages.front(), *alone);
-  } catch (const InputError&) {
-    // The X-ray has no gradients over most of the shadow.
-    return {};
+TargetEvidence TargetExaminer::evidence(const RigidTransform& room_from_ct) {
+  constexpr double kTurnRad = 1e-3;
+  constexpr double kMoveMm = 0.1;
+  const PoseFrame frame = problem_->frame();
+  PoseParameters held = parameters_from_pose(frame, room_from_ct);
+  LatticePose place{};
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    place[at] = std::llround(held.rotation_rad[i] / kTurnRad);
+    place[at + 3] = std::llround(held.translation_mm[i] / kMoveMm);
+    held.rotation_rad[i] = kTurnRad * static_cast<double>(place[at]);
+    held.translation_mm[i] = kMoveMm * static_cast<double>(place[at + 3]);
   }
+  auto known = answers_.find(place);
+  if (known == answers_.end())
+    known =
+        answers_.emplace(place, answer_at(*problem_, pose_from_parameters(frame, held), threads_))
+            .first;
+  const std::optional<TargetAnswer>& answer = known->second;
+  if (!answer) return {};
+  return {answer->share, across_mm(*problem_, room_from_ct, answer->room_from_ct)};
 }
 
 }  // namespace af::registration

@@ -69,6 +69,22 @@ TEST(TargetExaminer, AgreesWithARigidPatient) {
   EXPECT_LE(evidence.share, 1.0);
 }
 
+TEST(TargetExaminer, SaysTheSameWhateverItWasAskedBefore) {
+  const SmallCase moved = case_with(moved_by({4, 0, 0}));
+  const RigidTransform near = moved_by({0.01, 0, 0}) * moved.gold_room_from_ct;
+  const RigidTransform far = moved_by({0, 3, 0}) * moved.gold_room_from_ct;
+  const TargetEvidence alone = TargetExaminer(moved.problem).evidence(near);
+  TargetExaminer asked(moved.problem);
+  const TargetEvidence of_far = asked.evidence(far);
+  const TargetEvidence of_gold = asked.evidence(moved.gold_room_from_ct);
+  const TargetEvidence of_near = asked.evidence(near);
+  EXPECT_EQ(of_near.share, alone.share);
+  EXPECT_EQ(of_near.apart_mm, alone.apart_mm);
+  EXPECT_NE(of_far.share, alone.share);
+  // How far it is apart is of the pose itself, not of the lattice's.
+  EXPECT_NEAR(of_gold.apart_mm - of_near.apart_mm, 0.01, 0.002);
+}
+
 TEST(TargetExaminer, SaysNothingWhereTheTargetCannotBeAsked) {
   const auto is_silent = [](const SmallCase& of) {
     const TargetEvidence evidence = TargetExaminer(of.problem).evidence(of.gold_room_from_ct);
