@@ -26,14 +26,18 @@ command again, also with more patients. Needs the programs in build/release/bin 
   --kinds LIST            comma separated, in turn                                                [spine,pelvis,head]
   --ct NAME=PATH          one more patient: a real CT; may be repeated
   --poses N               true poses, each with noise and stresses of its own, per patient                       [3]
-  --variants LIST         clean, all, or names that af-simulate --stress takes, joined by +              [clean,all]
+  --variants LIST         clean, all, or names that af-simulate --stress takes, joined by +. moved, moved+all and so
+                          on: a bone has moved against the rest in the X-rays (af-simulate --moved-bone); with one of
+                          these the patient's bones are the targets of all variants, in turn              [clean,all]
   --presets LIST          comma separated                                                       [robust,fast,paper]
   --views LIST            2, 1 or both                                                                         [2,1]
   --intervals N           intervals of initial TRE of 2 mm, from 0                                              [15]
   --starts N              starts in each of them per true pose                                                   [1]
   --raycast-patients N    of the first N patients, on clean X-rays, also by ray casting with robust:            [12]
   --raycast-intervals N   ... one start in each of the first N intervals                                         [4]
+  --simulate OPTIONS      options of af-simulate, in one word                                                 [none]
   --field OPTIONS         options of af-precompute, in one word                                  [--preset standard]
+  --registration OPTIONS  options of af-evaluate registration, in one word                                    [none]
   --max-rotation-deg X    range of the fields, degrees                                                          [20]
   --max-translation-mm X  range of the fields, mm                                                               [40]
   --quick                 6 patients, 2 poses, ray casting of 1 patient
@@ -48,12 +52,15 @@ command again, also with more patients. Needs the programs in build/release/bin 
 TEXT
 }
 
+# A moved bone changes the X-rays alone: the CT and the fields are those of the variant without it.
+ct_variant_of() { case "$1" in moved) echo clean ;; moved+*) echo "${1#moved+}" ;; *) echo "$1" ;; esac }
+
 # --- options -----------------------------------------------------------------------------------------------------
 
 target="$PWD/population" patients=60 first=1 kinds=spine,pelvis,head poses=3 variants=clean,all presets=robust,fast,paper
 views=2,1 intervals=15 starts=1 raycast_patients=12 raycast_intervals=4 field_words="--preset standard"
 max_rotation_deg=20 max_translation_mm=40 ranks=$(core_count) seed=1 mode=local resources="$af_root/jobs/slurm/resources.sh"
-cts=() dry_run_option=()
+simulate_words="" registration_words="" cts=() dry_run_option=()
 while (($# > 0)); do
   case "$1" in
     --output | -o) need_value "$1" $#; target=$2; shift ;;
@@ -69,7 +76,9 @@ while (($# > 0)); do
     --starts) need_value "$1" $#; need_count "$1" "$2"; starts=$2; shift ;;
     --raycast-patients) need_value "$1" $#; need_seed "$1" "$2"; raycast_patients=$2; shift ;;
     --raycast-intervals) need_value "$1" $#; need_count "$1" "$2"; raycast_intervals=$2; shift ;;
+    --simulate) need_value "$1" $#; simulate_words=$2; shift ;;
     --field) need_value "$1" $#; field_words=$2; shift ;;
+    --registration) need_value "$1" $#; registration_words=$2; shift ;;
     --max-rotation-deg) need_value "$1" $#; max_rotation_deg=$2; shift ;;
     --max-translation-mm) need_value "$1" $#; max_translation_mm=$2; shift ;;
     --quick) patients=6 poses=2 raycast_patients=1 raycast_intervals=2 ;;
@@ -88,13 +97,23 @@ IFS=, read -r -a kind_list <<<"$kinds"
 IFS=, read -r -a variant_list <<<"$variants"
 IFS=, read -r -a preset_list <<<"$presets"
 IFS=, read -r -a view_list <<<"$views"
+has_moved_bones=no
+for ((i = 0; i < ${#variant_list[@]}; ++i)); do
+  [[ "${variant_list[i]}" == moved* ]] || continue
+  has_moved_bones=yes
+  [[ " ${variant_list[*]:0:i} " == *" $(ct_variant_of "${variant_list[i]}") "* ]] ||
+    die 2 "--variants = '$variants': ${variant_list[i]} needs $(ct_variant_of "${variant_list[i]}") before it, whose CT and fields it shares"
+done
+read -r -a simulate_options <<<"$simulate_words"
 read -r -a field_options <<<"$field_words"
+read -r -a registration_options <<<"$registration_words"
 for count in "${view_list[@]}"; do
   [[ "$count" == [12] ]] || die 2 "--views = '$views' must name 2, 1 or both"
 done
 for kind in "${kind_list[@]}"; do
   [[ "$kind" =~ ^(spine|pelvis|head)$ ]] || die 2 "--kinds = '$kinds' must name some of spine, pelvis, head"
 done
+[[ $has_moved_bones == no ]] || ((${#cts[@]} == 0)) || die 2 "--variants = '$variants': a bone moves in drawn patients, not in a --ct"
 
 bin=$(program_folder)
 need_programs "$bin" af-simulate af-precompute af-evaluate af-inspect
@@ -105,17 +124,32 @@ stages_of_any_build=yes
 
 # --- one patient -------------------------------------------------------------------------------------------------
 
+# bone_option PATIENT VARIANT: the option that makes a bone of the patient the target, and moves it.
+bone_option() {
+  local number=$((10#${1##*-})) bones option=--target-bone
+  case "$1" in
+    spine-*) bones=(T9 T10 T11 T12 L1 L2 L3) ;;
+    pelvis-*) bones=(left-femur right-femur) ;;
+    head-*) bones=(jaw) ;;
+  esac
+  [[ "$2" != moved* ]] || option=--moved-bone
+  printf '%s\n' "$option" "${bones[$((number / ${#kind_list[@]} % ${#bones[@]}))]}"
+}
+
 # make_session PATIENT SOURCE VARIANT POSE: X-rays of a patient at one true pose. One planning CT serves all poses: those
 # after the first refer to the first one's, which matters where the CT is degraded by noise of its own.
 make_session() {
-  local patient=$1 source=$2 variant=$3 pose=$4 name="$1-$3-p$4" stress words
+  local patient=$1 source=$2 variant=$3 pose=$4 name="$1-$3-p$4" ct_variant stress words bone=()
   IFS=$'\t' read -r -a words <<<"$source"
-  stress=$(stress_of "$variant")
-  "$bin/af-simulate" "${words[@]}" --case "$patient-p$pose" --rig treatment-room --seed "$((seed * 1000 + pose))" \
-    --no-fiducials ${stress:+--stress "$stress"} --force -o "$output/studies/$name" || return
-  ((pose > 1)) || return 0
+  ct_variant=$(ct_variant_of "$variant")
+  stress=$(stress_of "$ct_variant")
+  [[ $has_moved_bones == no ]] || readarray -t bone < <(bone_option "$patient" "$variant")
+  "$bin/af-simulate" "${words[@]}" "${bone[@]}" --case "$patient-p$pose" --rig treatment-room \
+    --seed "$((seed * 1000 + pose))" --no-fiducials ${stress:+--stress "$stress"} "${simulate_options[@]}" --force \
+    -o "$output/studies/$name" || return
+  [[ "$name" != "$patient-$ct_variant-p1" ]] || return 0
   [[ ! -f "$output/studies/$name/ct.nii.gz" ]] || rm "$output/studies/$name/ct.nii.gz"
-  sed -i "s|^ct = \"ct.nii.gz\"|ct = \"../$patient-$variant-p1/ct.nii.gz\"|" "$output/studies/$name/study.toml"
+  sed -i "s|^ct = \"ct.nii.gz\"|ct = \"../$patient-$ct_variant-p1/ct.nii.gz\"|" "$output/studies/$name/study.toml"
 }
 
 # one_view STUDY OUTPUT: every case without its second and further views.
@@ -131,7 +165,7 @@ sessions() {
     studies+=("$output/studies/$patient-$variant-p$pose/study.toml")
   done
   stage "join $patient-$variant" "$study" "$bin/af-evaluate" join-studies "${studies[@]}" \
-    --fields "$output/fields/$patient-$variant-{camera}.af.h5" -o "$study"
+    --fields "$output/fields/$patient-$(ct_variant_of "$variant")-{camera}.af.h5" -o "$study"
   one_view "$study" "${study%-2.toml}-1.toml"
 }
 
@@ -141,20 +175,21 @@ register() {
   shift 2
   stage "$folder" "$output/runs/$folder/summary.json" run_ranks "$ranks" "$bin/af-evaluate" registration \
     --study "$study" --gold study --intervals "$intervals" --starts-per-interval "$starts" --seed "$seed" \
-    --start-rule within-range --no-pictures "$@" -o "$output/runs/$folder"
+    --start-rule within-range --no-pictures "${registration_options[@]}" "$@" -o "$output/runs/$folder"
 }
 
 # study_patient NAME SOURCE: every condition of one patient.
 study_patient() {
-  local patient=$1 variant camera count preset study
-  stage_inputs="$2, seed $seed, $poses poses, $field_words, $max_rotation_deg deg, $max_translation_mm mm: "
+  local patient=$1 variant ct_variant camera count preset study
+  stage_inputs="$2, seed $seed, $poses poses, $simulate_words, $field_words, $max_rotation_deg deg, $max_translation_mm mm: "
   for variant in "${variant_list[@]}"; do
     sessions "$patient" "$2" "$variant"
+    ct_variant=$(ct_variant_of "$variant")
     for camera in A B; do
-      stage "field $patient-$variant-$camera" "$output/fields/$patient-$variant-$camera.af.h5" run_ranks "$ranks" \
-        "$bin/af-precompute" --study "$output/studies/$patient-$variant-p1/study.toml" --camera "$camera" \
+      stage "field $patient-$ct_variant-$camera" "$output/fields/$patient-$ct_variant-$camera.af.h5" run_ranks "$ranks" \
+        "$bin/af-precompute" --study "$output/studies/$patient-$ct_variant-p1/study.toml" --camera "$camera" \
         "${field_options[@]}" --max-rotation-deg "$max_rotation_deg" --max-translation-mm "$max_translation_mm" \
-        --seed "$seed" -o "$output/fields/$patient-$variant-$camera.af.h5"
+        --seed "$seed" -o "$output/fields/$patient-$ct_variant-$camera.af.h5"
     done
     for count in "${view_list[@]}"; do
       for preset in "${preset_list[@]}"; do
@@ -211,7 +246,7 @@ submit_conditions() {
           printf '%q ' "${field_options[@]}" --max-rotation-deg "$max_rotation_deg" --max-translation-mm "$max_translation_mm"
           printf ')\nevaluate_options=('
           printf '%q ' --preset "$preset" --gold study --intervals "$intervals" --starts-per-interval "$starts" \
-            --seed "$seed" --start-rule within-range --no-pictures
+            --seed "$seed" --start-rule within-range --no-pictures "${registration_options[@]}"
           printf ')\n'
         } >"$output/$condition-resources.sh"
         "$af_root/jobs/submit.sh" "$output/$variant-$count.toml" --resources "$output/$condition-resources.sh" \

@@ -67,6 +67,9 @@ void describe_target(Fields& field, SimulateOptions& o) {
         "Box over which TRE is taken: low x,y,z, high x,y,z (LPS, mm). Default: 60 mm a side")
       .count(6)
       .comma_separated();
+  field("target_bone",
+        o.target_bone,
+        "Phantoms only: the target is this bone, one of those that --moved-bone takes");
   field("roi_px",
         o.roi_px,
         "Width,height of the region of interest on each detector, centred on the projected target. "
@@ -117,15 +120,28 @@ void append_scan_problems(const SimulateOptions& options, std::vector<std::strin
                       ": must be between -80 and 80 degrees");
 }
 
+/// The option that names a bone as the target; empty without.
+std::string bone_option(const SimulateOptions& options) {
+  if (!options.moved_bone.empty()) return "moved-bone";
+  return options.target_bone.empty() ? "" : "target-bone";
+}
+
+const std::string& bone_of(const SimulateOptions& options) {
+  return options.moved_bone.empty() ? options.target_bone : options.moved_bone;
+}
+
 void append_bone_problems(const SimulateOptions& options, std::vector<std::string>& found) {
-  if (options.moved_bone.empty()) return;
+  const std::string option = bone_option(options);
+  if (option.empty()) return;
+  if (!options.target_bone.empty() && !options.moved_bone.empty())
+    found.push_back("target-bone: not with --moved-bone, whose bone is the target");
   if (options.phantom.empty()) {
-    found.push_back("moved-bone: applies to --phantom only; a CT does not tell bones apart");
+    found.push_back(option + ": applies to --phantom only; a CT does not tell bones apart");
     return;
   }
   const std::vector<PhantomBone> bones = make_phantom(options.phantom, false).bones;
-  if (find_row(bones, options.moved_bone) == nullptr)
-    found.push_back(unknown_name_text(bones, "moved-bone", options.moved_bone));
+  if (find_row(bones, bone_of(options)) == nullptr)
+    found.push_back(unknown_name_text(bones, option, bone_of(options)));
 }
 
 /// Studies are refused whose target box breaks the rule of target_box_problem().
@@ -182,8 +198,8 @@ std::vector<std::string> problems(const SimulateOptions& options) {
 Phantom phantom_of(const SimulateOptions& options) {
   Phantom phantom = make_phantom(
       options.phantom, options.phantom_options.has_metal, options.phantom_options.anatomy_seed);
-  if (!options.moved_bone.empty())
-    phantom.target = required_row(phantom.bones, "moved-bone", options.moved_bone).target;
+  if (const std::string option = bone_option(options); !option.empty())
+    phantom.target = required_row(phantom.bones, option, bone_of(options)).target;
   return phantom;
 }
 

@@ -39,6 +39,7 @@ struct SimulateOptions {
 
   std::vector<double> center_ct_mm;      ///< x, y, z
   std::vector<double> target_box_ct_mm;  ///< low x, y, z, high x, y, z
+  std::string target_bone;               ///< of the phantom
   std::vector<int> roi_px;               ///< width, height
 
   double max_offset_rotation_deg = 5.0;
@@ -66,7 +67,7 @@ struct SimulateOptions {
 
 std::vector<std::string> problems(const SimulateOptions& options);
 
-/// The phantom that is asked for; its target is the moved bone, if there is one.
+/// The phantom that is asked for; its target is the moved or target bone, if there is one.
 Phantom phantom_of(const SimulateOptions& options);
 
 }  // namespace af::tools

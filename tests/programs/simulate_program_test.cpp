@@ -233,6 +233,9 @@ TEST_F(AfSimulate, RefusesBadInputByTheContractsCodesAndLeavesNothing) {
       {coarse + "--moved-bone jaw", 3, "must be one of T9, T10, T11, T12, L1, L2, L3"},
       {"--phantom head --moved-bone T12", 3, "moved-bone = 'T12': must be one of jaw"},
       {coarse + "--moved-bone T12 --cone-beam 8", 3, "moved-bone: applies to studies only"},
+      {"--ct a --target-bone T12", 3, "target-bone: applies to --phantom only"},
+      {"--phantom head --target-bone T12", 3, "target-bone = 'T12': must be one of jaw"},
+      {coarse + "--target-bone T12 --moved-bone L1", 3, "target-bone: not with --moved-bone"},
       {coarse + "--bits 7", 3, "bits = 7"},
       {coarse + "--tube-kvp 10", 3, "tube-kvp = 10"},
       {coarse + "--water-mu-per-mm 0.6", 3, "water_mu_per_mm"},
@@ -377,8 +380,8 @@ class MovedT12 : public AfSimulate {
 };
 
 TEST_F(MovedT12, HasItsOwnPoseInTheTruthAndTheRestHasThatOfTheSameStudyWithoutIt) {
-  const StudyCase& still = simulated("--ideal", "still");
-  const StudyCase& moved = simulated("--ideal --moved-bone T12", "moved");
+  const StudyCase& still = simulated("--ideal --target-bone T10", "still");
+  const StudyCase& moved = simulated("--ideal --moved-bone T10", "moved");
   EXPECT_EQ(moved.center_ct_mm, still.center_ct_mm);
   EXPECT_EQ(moved.target_box_ct.low_mm, still.target_box_ct.low_mm);
   EXPECT_EQ(moved.views[0].roi.column, still.views[0].roi.column);
