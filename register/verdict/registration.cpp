@@ -517,6 +517,16 @@ RegistrationResult Registration::search(const RigidTransform& start_room_from_ct
   return std::move(run.result);
 }
 
+/// Only of an end that an agreeing target makes found: it takes as long as a registration.
+void Registration::ask_target(RegistrationRecord& record) {
+  const double without_target = record.uncertainty.confidence;
+  record.uncertainty.confidence = confidence_if_target_agrees(without_target);
+  if (judgement_of(record).verdict == Verdict::Found)
+    record.uncertainty.target = target_examiner->evidence(record.result.room_from_ct);
+  if (!agrees_with_surroundings(record.uncertainty.target, record.view_values))
+    record.uncertainty.confidence = without_target;
+}
+
 RegistrationRecord Registration::run(const RigidTransform& start_room_from_ct,
                                      std::int64_t start_index) {
   RegistrationRecord record;
@@ -525,8 +535,7 @@ RegistrationRecord Registration::run(const RigidTransform& start_room_from_ct,
   if (!examiner) return record;
   record.view_values = examiner->view_values(record.result.room_from_ct, true);
   record.uncertainty = uncertainty->report(record.result, record.view_values);
-  if (target_examiner && judgement_of(record).verdict == Verdict::Found)
-    record.uncertainty.target = target_examiner->evidence(record.result.room_from_ct);
+  if (target_examiner) ask_target(record);
   return record;
 }
 

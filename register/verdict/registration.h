@@ -86,6 +86,8 @@ class Registration {
   [[nodiscard]] ObjectiveValue similarity_at(const RigidTransform& room_from_ct);
 
  private:
+  void ask_target(RegistrationRecord& record);
+
   std::vector<Eigen::Vector3d> step_points_ct_;
   OptimizerResult found_;  ///< reused
   ViewDiagnoser diagnoser_;

@@ -21,10 +21,18 @@ struct TargetEvidence {
   auto members() { return std::tie(share, apart_mm); }
 };
 
-/// Targets of rigid patients fit within 0.6 mm, bones that moved by 2 to 6 mm at least 1.1 mm away.
-inline constexpr double kTargetApartMm = 0.75;
+/// A target that fits farther than this from an end has moved against its surroundings: the least
+/// distance, and what is added to it where a pose leaves all of the X-rays' gradients unexplained,
+/// which hides where the target is. `jobs/verdicts.py`, docs/uncertainty.md.
+inline constexpr double kTargetApartMm = 0.2;
+inline constexpr double kTargetApartUnexplainedMm = 0.9;
+inline constexpr double kMostTargetApartMm = 0.75;
 
 /// A target with less than this share shows next to nothing of its own.
 inline constexpr double kLeastTargetShare = 0.05;
+
+/// How much more often the target of a right end agrees with its surroundings than that of a wrong
+/// one, moved bones included. Measured were 3 to 8.
+inline constexpr double kAgreementOdds = 2.0;
 
 }  // namespace af::registration

@@ -26,11 +26,12 @@ struct UncertaintyReport {
   /// With one view: the target's centre lies within this, to either side, along the beam with
   /// probability 0.95.
   double depth_95_mm = kNone;
-  TargetEvidence target;         ///< of an end that would be found without it
+  TargetEvidence target;         ///< of an end that is found if its target agrees
   double inflation = kNone;      ///< what calibration multiplied the sandwich by for the covariance
   double tre_inflation = kNone;  ///< and for the TREs
-  /// Probability that the registration succeeded (success_confidence()); a lower bound where
-  /// tre_rms_mm is NaN, 0 where there is no end.
+  /// Probability that the registration succeeded (success_confidence(); with a target that agrees,
+  /// confidence_if_target_agrees()); a lower bound where tre_rms_mm is NaN, 0 where there is no
+  /// end.
   double confidence = kNone;
 
   auto members() {

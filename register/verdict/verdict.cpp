@@ -35,6 +35,13 @@ std::string length_text(double mm) {
          " mm";
 }
 
+/// Beyond this a target disagrees with its surroundings, by how much of the X-rays is explained.
+double apart_limit_mm(std::span<const ViewValue> values) {
+  const double explained = std::clamp(summary_of(values, &ViewValue::coarse).mean, 0.0, 1.0);
+  return std::min(kMostTargetApartMm,
+                  kTargetApartMm + kTargetApartUnexplainedMm * (1.0 - explained));
+}
+
 }  // namespace
 
 const char* to_string(Verdict verdict) {
@@ -83,11 +90,19 @@ std::vector<std::string> doubts_of(const RegistrationResult& result,
   if (target.share < kLeastTargetShare)
     doubts.push_back("the target shows nothing of its own: of what the pose explains there, " +
                      percent_text(1.0 - target.share) + " is its surroundings");
-  else if (target.apart_mm > kTargetApartMm)
+  else if (target.apart_mm > apart_limit_mm(values))
     doubts.push_back("the target disagrees with its surroundings: by itself it fits " +
                      length_text(target.apart_mm) +
                      " from here; it may have moved against the rest");
   return doubts;
+}
+
+bool agrees_with_surroundings(const TargetEvidence& target, std::span<const ViewValue> values) {
+  return target.share >= kLeastTargetShare && target.apart_mm <= apart_limit_mm(values);
+}
+
+double confidence_if_target_agrees(double confidence) {
+  return kAgreementOdds * confidence / (1.0 + (kAgreementOdds - 1.0) * confidence);
 }
 
 Judgement judged_confidence(const UncertaintyReport& report, std::span<const ViewValue> values) {

@@ -77,6 +77,13 @@ std::vector<std::string> doubts_of(const RegistrationResult& result,
                                    std::span<const ViewValue> values,
                                    const TargetEvidence& target);
 
+/// Whether the target was asked and fits by itself where its surroundings do, and shows enough.
+bool agrees_with_surroundings(const TargetEvidence& target, std::span<const ViewValue> values);
+
+/// Of an end whose target agrees with its surroundings: its odds times kAgreementOdds. \test
+/// Judgement.AnAgreeingTargetDoublesTheOdds
+double confidence_if_target_agrees(double confidence);
+
 /// The verdict by the probability that the end is right, UncertaintyReport::confidence. Where no
 /// TRE is predicted, the confidence is a lower bound, by which nothing is rejected.
 Judgement judged_confidence(const UncertaintyReport& report, std::span<const ViewValue> values);

@@ -86,9 +86,16 @@ TEST(Judgement, ATargetThatDisagreesWithItsSurroundingsIsDoubtful) {
     record.uncertainty.target = target;
     return record;
   };
-  EXPECT_EQ(verdict_of(record_of(0.9968, {0.7, 0.74})), Verdict::Found);
-  EXPECT_EQ(verdict_of(record_of(0.9968, {0.7, 0.76})), Verdict::Doubtful);
   EXPECT_EQ(verdict_of(record_of(0.01, {0.7, 3.5})), Verdict::NotFound);
+  // The better the X-rays are explained, the less a target may be apart.
+  RegistrationRecord record = record_of(0.9968, {});
+  for (const auto& [explained, most_mm] : {std::pair(0.95, 0.245), {0.5, 0.65}, {0.2, 0.75}}) {
+    for (ViewValue& value : record.view_values) value.coarse = explained;
+    record.uncertainty.target = {0.7, most_mm - 0.01};
+    EXPECT_EQ(verdict_of(record), Verdict::Found) << explained;
+    record.uncertainty.target = {0.7, most_mm + 0.01};
+    EXPECT_EQ(verdict_of(record), Verdict::Doubtful) << explained;
+  }
   EXPECT_EQ(verdict_of(record_of(0.9968, {0.04, 0.0})), Verdict::Doubtful);
   EXPECT_EQ(verdict_of(record_of(0.9968, {})), Verdict::Found) << "it was not asked";
   EXPECT_EQ(
@@ -96,6 +103,18 @@ TEST(Judgement, ATargetThatDisagreesWithItsSurroundingsIsDoubtful) {
       "the target disagrees with its surroundings: by itself it fits 3.5 mm from here; it may "
       "have moved against the rest; but for that right with 99.6 % (TRE below 2.5 mm), at "
       "least 99.0 % wanted");
+}
+
+TEST(Judgement, AnAgreeingTargetDoublesTheOdds) {
+  EXPECT_NEAR(confidence_if_target_agrees(0.5), 2.0 / 3.0, 1e-12);
+  EXPECT_NEAR(confidence_if_target_agrees(0.99), 198.0 / 199.0, 1e-12);
+  EXPECT_EQ(confidence_if_target_agrees(0.0), 0.0);
+  EXPECT_EQ(confidence_if_target_agrees(1.0), 1.0);
+  const std::vector<ViewValue> values(2, {0.9, 0.9});
+  EXPECT_TRUE(agrees_with_surroundings({0.7, 0.2}, values));
+  EXPECT_FALSE(agrees_with_surroundings({0.7, 0.4}, values));
+  EXPECT_FALSE(agrees_with_surroundings({0.04, 0.0}, values));
+  EXPECT_FALSE(agrees_with_surroundings({}, values)) << "it was not asked";
 }
 
 TEST(Judgement, OfOneViewSaysWhatIsNotKnown) {
