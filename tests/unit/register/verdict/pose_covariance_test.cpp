@@ -241,7 +241,7 @@ TEST(Calibration, ConfidenceOfOneViewLooksAtWhatPosesBesideExplain) {
   const auto confidence = [](double fine, double background) {
     return success_confidence({std::vector<ViewValue>{{0.8, fine, false, background}}, 30.0});
   };
-  // The real skull under all stresses, pose 1: right and wrong ends (docs/population.md).
+  // The real skull under all stresses, pose 1: right and wrong ends (docs/robust-tuning.md).
   EXPECT_GT(confidence(0.095, 0.008), 0.8);
   EXPECT_LT(confidence(0.153, 0.061), confidence(0.095, 0.008));
   EXPECT_GT(confidence(0.5, 0.0), 0.99);

@@ -249,7 +249,7 @@ TEST(RegistrationOptions, NamesEverythingThatIsWrong) {
 }
 
 // At level 2 steel and scatter have optima of their own within the region alone: under all stresses
-// chains then left the right pose for ends 4 to 11 mm off (docs/population.md).
+// chains then left the right pose for ends 4 to 11 mm off (docs/robust-tuning.md).
 TEST(RegistrationOptions, RobustSeesTheRegionAloneNoCoarserThanLevelOne) {
   for (const ChainOptions& chain : preset_options("robust").chains)
     for (const StageOptions& stage : chain.stages)
