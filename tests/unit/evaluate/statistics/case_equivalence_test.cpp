@@ -79,7 +79,7 @@ TEST(CaseEquivalence, IsRarelyClaimedWrongly) {
     return test::wrong_equivalence_claims(
         {.cases = cases, .log_sd = 0.4, .studies = 1000, .seed = 1, .replicates = 200});
   };
-  // docs/errors.md has 6 % and 5 % (bench-interval-coverage); five standard errors of 0.75 %.
+  // docs/data/equivalence-claims.csv has 5.9 and 4.1 %; five standard errors of 0.75 %.
   EXPECT_LT(claims(10), 0.06 + 5 * 0.0075);
   EXPECT_LT(claims(30), 0.05 + 5 * 0.0075);
   EXPECT_GT(claims(10), 0.0) << "the simulation claims nothing at all";
