@@ -12,7 +12,7 @@ namespace af {
 
 namespace {
 
-// Exponents found on three CTs (precompute/README.md).
+// Exponents found on three CTs.
 constexpr double kUvExponent = 3.0;
 constexpr double kStExponent = 2.1;
 constexpr double kQuantisationUvExponent = 1.0;

@@ -22,7 +22,7 @@ af_add_test(
   FIXTURE default_ct)
 target_compile_definitions(shear_warp_accuracy_test PRIVATE AF_DEFAULT_CT_PATH="${af_default_ct}")
 
-# The table of precompute/README.md, one row at a time.
+# The accuracy that precompute/README.md states, one camera at a time.
 add_executable(caster_accuracy physics/caster_accuracy_main.cpp physics/caster_accuracy.cpp)
 target_link_libraries(caster_accuracy PRIVATE af_compile_options af_test_support af_precompute_build af_study af_ranks)
 af_compile_as(quick caster_accuracy)

@@ -12,7 +12,7 @@ namespace {
 // 2.3 % (-16.4 dB) of the field's own: 75 dB are enough for fields of up to 58 dB, and those of the
 // skull reach some 50.
 constexpr double kLeastDb = 75.0;
-// As many as the table of precompute/README.md.
+// As many as caster_accuracy takes.
 constexpr int kRows = 400;
 
 CtVolume skull() {
