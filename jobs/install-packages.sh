@@ -23,8 +23,8 @@ trixie_packages=(libfftw3-dev)
 benchmark_packages=(plastimatch libfaiss-dev libopenblas-dev)
 # What jobs/peers.sh registers with.
 peer_packages=(plastimatch elastix python3-torch python3-nlopt)
-# Formatter, linters, the browser that opens the report in a test, and what reads manual pages and completions in tests.
-lint_packages=(shellcheck chromium groff-base bsdextrautils zsh)
+# Formatter, linters, the browser that opens the report in a test, and what reads manual pages, completions and fields in tests.
+lint_packages=(shellcheck chromium groff-base bsdextrautils zsh hdf5-tools)
 bookworm_lint_packages=(clang-format-14 clang-tidy-14)
 # Large, and only one test and one example of the Python module need it; they are skipped without it.
 torch_packages=(python3-torch)
@@ -39,8 +39,8 @@ Installs the packages that the project needs to build, run and pass its tests on
 13 (trixie). Says what it does; does nothing when all are there. Needs root or sudo only to install.
 
   --with-lint         also the formatter, the linters, the browser that checks reports, and what checks
-                      manual pages and completions (shellcheck, chromium, groff-base, bsdextrautils, zsh,
-                      and clang-format-14 and clang-tidy-14, which Debian 13 does not have)
+                      manual pages, completions and fields (shellcheck, chromium, groff-base, bsdextrautils,
+                      zsh, hdf5-tools, and clang-format-14 and clang-tidy-14, which Debian 13 does not have)
   --with-benchmarks   also what tests/benchmark/run.sh compares with (plastimatch, Faiss, OpenBLAS)
   --with-slurm        also a Slurm of one node, for tests/slurm
   --with-torch        also PyTorch, for the test and the example of differentiable DRRs

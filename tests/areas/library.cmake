@@ -36,7 +36,9 @@ if(AF_BUILD_PYTHON)
   af_add_python_test(module ${CMAKE_CURRENT_SOURCE_DIR}/python/test_module.py)
   af_add_python_test(processes ${CMAKE_CURRENT_SOURCE_DIR}/python/test_processes.py)
   af_add_python_test(torch ${CMAKE_CURRENT_SOURCE_DIR}/python/test_torch.py)
-  foreach(example look_up_and_compare register_with_torch register_a_phantom evaluate_results)
+  af_add_python_test(field_format ${CMAKE_CURRENT_SOURCE_DIR}/python/test_field_format.py
+                     ${PROJECT_SOURCE_DIR}/docs/reference/field-format.md)
+  foreach(example look_up_and_compare register_with_torch register_a_phantom evaluate_results decode_viewpoint)
     af_add_python_test(example_${example} ${CMAKE_CURRENT_SOURCE_DIR}/python/test_examples.py ${PROJECT_SOURCE_DIR}/python/examples
                        ${example})
   endforeach()

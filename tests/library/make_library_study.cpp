@@ -4,9 +4,13 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <memory>
+#include <span>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
+#include "drr/field_level.h"
 #include "drr/field_renderer.h"
 #include "field/field_reading.h"
 #include "library/library_study.h"
@@ -43,6 +47,21 @@ void write_motion_gradient(const fs::path& field_path, const fs::path& output) {
              static_cast<std::streamsize>(values.size() * sizeof(float)));
 }
 
+/// The levels of a field as its tiles have them, without a filter, [slab][u][v][t][s].
+void write_tile_levels(const fs::path& field_path) {
+  auto field = *af::read_field(field_path, af::Communicator::alone());
+  field.codebook.filter.reset();
+  const af::FieldLevel decoded =
+      af::decode_field(std::make_shared<const af::CompressedAttenuationField>(std::move(field)));
+  std::ofstream output(field_path.string() + ".levels.u16", std::ios::binary);
+  for (const af::FieldLevelSlab& slab : decoded.slabs) {
+    const auto levels = std::as_bytes(
+        slab.samples.view().first(decoded.viewpoint_count() * slab.samples_per_viewpoint()));
+    output.write(reinterpret_cast<const char*>(levels.data()),
+                 static_cast<std::streamsize>(levels.size()));
+  }
+}
+
 void make(const fs::path& folder, const std::string& programs) {
   fs::remove_all(folder);
   fs::create_directories(folder);
@@ -59,6 +78,13 @@ void make(const fs::path& folder, const std::string& programs) {
   }
   run(programs + "/af-precompute" + study + " --camera AP --material bone" + design +
       (folder / "AP.bone.af.h5").string());
+  // With what a file may hold beyond that: slabs, means, a tile filter, bounds per axis. Viewpoints
+  // are odd in number, so that the last tiles are padded.
+  run(programs + "/af-precompute" + study +
+      " --camera AP --preset standard --max-rotation-deg 5 --max-translation-mm 10"
+      " --translation-range-mm ty=-8:12 --slabs 2 --uv-nodes 7 --st-nodes 95 --codewords 256 -o " +
+      (folder / "AP.standard.af.h5").string());
+  for (const char* name : {"AP.af.h5", "AP.standard.af.h5"}) write_tile_levels(folder / name);
   const std::string atlas = (folder / "AP.atlas.af.h5").string();
   run(programs + "/af-precompute" + study + " --camera AP --orbit axis=z,from=-8,to=8,step=8" +
       design + atlas);

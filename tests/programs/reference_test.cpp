@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// docs/reference/ is what the programs print of themselves and what the code knows of its files.
+// docs/reference/ is what the programs print of themselves and what the code knows of its files;
+// field-format.md, which is written by hand, has the code's rules.
 // After a change: AF_WRITE_REFERENCE=1 build/release/tests/reference_tests
 #include <cstdlib>
 #include <sstream>
@@ -9,7 +10,6 @@
 #include <gtest/gtest.h>
 
 #include "field/field_layout.h"
-#include "field/field_writing.h"
 #include "files/output_file.h"
 #include "register/results/registration_columns.h"
 #include "register/results/registration_results.h"
@@ -29,19 +29,14 @@ void expect_page(const std::string& name, const std::string& text) {
       << path << " differs from the code: AF_WRITE_REFERENCE=1 " << AF_REFERENCE_PROGRAM;
 }
 
-std::string dataset_table() {
+/// A dataset's row in field-format.md, but for what it says of it.
+std::string row_of(const field_layout::DatasetRule& rule) {
   std::ostringstream out;
-  out << "| Dataset | Type | Extents | Unit | Frame |\n|---|---|---|---|---|\n";
-  std::vector<field_layout::DatasetRule> rules = field_layout::payload_rules(1, {true, true});
-  for (const field_layout::DatasetRule& rule : field_layout::provenance_rules())
-    rules.push_back(rule);
-  for (const field_layout::DatasetRule& rule : rules) {
-    out << "| `" << rule.name << "` | " << to_string(rule.type) << " | ";
-    for (std::size_t i = 0; i < rule.extents.size(); ++i)
-      out << (i == 0 ? "" : " x ") << (i == 0 && rule.is_first_extent_free ? "up to " : "")
-          << rule.extents[i];
-    out << " | " << rule.units << " | " << rule.frame << " |\n";
-  }
+  out << "| `" << rule.name << "` | " << to_string(rule.type) << " | ";
+  for (std::size_t i = 0; i < rule.extents.size(); ++i)
+    out << (i == 0 ? "" : " x ") << (i == 0 && rule.is_first_extent_free ? "up to " : "")
+        << rule.extents[i];
+  out << " | " << rule.units << " | " << rule.frame << " | ";
   return out.str();
 }
 
@@ -54,70 +49,50 @@ std::string code_list(const std::vector<std::string>& names) {
 std::string file_page() {
   using namespace registration;
   std::ostringstream page;
-  page
-      << "# Files\n\nThis page is made from the code (`tests/programs/reference_test.cpp`).\n\n"
-      << "## study.toml\n\n`af-inspect --template study` prints this:\n\n```toml\n"
-      << template_text("study") << "```\n\n## rig.toml\n\n`af-inspect --template rig` prints "
-      << "this:\n\n```toml\n"
-      << template_text("rig") << "```\n\n## scan.toml\n\n`af-inspect --template scan` prints "
-      << "this ([how it is used](../real-xrays.md)):\n\n```toml\n"
-      << template_text("scan") << "```\n\n## Fields (`.af.h5`)\n\nHDF5, format "
-      << field_layout::kFormat << ", version " << field_layout::kFormatVersion
-      << ". A field of several depth slabs has `/geometry/slab_1/`, `/field/slab_1` and so on. "
-      << "`/field/slab_0/codewords` holds the codeword of each tile, uint16, by (u, v, s, t). "
-      << "Fields of mean-removed tiles have `/codebook/mean_step`, and in `/field/slab_0/means` "
-         "the "
-      << "means of the tiles in levels, uint16, by (u, v, t, s). Along t a mean is stored as the "
-      << "difference from the one before, modulo 65536, but every " << kMeanRunTiles
-      << "th as it is, from the first on. Codeword 0 is an empty tile; the level of any other "
-      << "tile's element is its mean + the codeword's element - 32768, within 0 and 65535. Fields "
-      << "with a tile filter have `/codebook/tile_filter`, the weights by which decoded tiles are "
-      << "corrected ([how](../../precompute/README.md#tile-filter)). Chunks are shuffled, deflated "
-      << "and carry HDF5's Fletcher-32. "
-      << "[Frames](../../common/geometry/README.md), "
-      << "[coding](../coding.md).\n\n"
-      << dataset_table() << "\nAn atlas (`af-precompute --orbit`, [page](../other-cameras.md)) has "
-      << "the format " << field_layout::kAtlasFormat << " and the same version. In its root stand `"
-      << field_layout::member_count_rule().name << "`, `/identity` of the camera that the orbit "
-      << "begins from, `/codebook` and `/provenance`; each field is a group, `"
-      << field_layout::member_group(0) << "`, `" << field_layout::member_group(1)
-      << "`, ..., with `geometry`, `identity` and `field` as above.\n"
-      << "\n## Results of af-register\n\nIn the folder of `--output`: "
-      << code_list(result_file_names())
-      << ", one `CAMERA-overlay.png` per view, and `slicer/`. Which of them are there depends on "
-      << "the verdict ([register/README.md](../../register/README.md)).\n\n"
-      << "## registrations.csv\n\nOne row per registration, with these columns; `af-evaluate` "
-      << "and `--correct` add more between them ([errors.md](../errors.md) defines the "
-      << "errors):\n\n"
-      << code_list(columns_of(registration_cells({}, {}, {})))
-      << "\n\nWith `--correct`: " << code_list(columns_of(correction_cells({})))
-      << ".\n\nWithout `--no-uncertainty` ([uncertainty.md](../uncertainty.md)): "
-      << code_list(columns_of(judge_cells({}))) << ", "
-      << code_list(columns_of(uncertainty_cells({}, 0.0))) << ".\n\n"
-      << "## summary.json\n\nIn the folder of a finished run of `af-evaluate`; `af-evaluate "
-      << "report` reads it. Numbers that are not known are null.\n\n"
-      << "| Key | Of which kinds | What |\n|---|---|---|\n"
-      << "| `format`, `format_version` | all | \"attenuation-fields evaluation\", 1 |\n"
-      << "| `kind` | all | \"registration\", \"image-quality\", \"field-parameters\", "
-         "\"similarity-curves\" or \"error-budget\" |\n"
-      << "| `provenance` | all | program and version, command line, options in force, seed, "
-         "SHA-256 of the inputs (`input_sha256`), where CTs lie (`input_grids`), how X-rays, CTs "
-         "and fields are read (`input_notes`), "
-         "host, start |\n"
-      << "| `figures`, `pictures` | all that draw | names of figures without ending; files of "
-         "pictures and what they show |\n"
-      << "| `study`, `method`, `success_tre_mm`, `start_rule`, `simulation` | registration | the "
-         "study's path; preset, similarity and optimisers; what a success and a start are; how "
-         "the study was simulated, or null |\n"
-      << "| `cases` | registration | per case its gold pose, region and starts |\n"
-      << "| `renderers` | registration, similarity-curves | per renderer successes, TRE, times "
-         "and their intervals; or the curves' maxima |\n"
-      << "| `field_against_raycast` | registration | the same starts by both renderers |\n"
-      << "| `row_problems`, `warnings` | registration | rows that failed, and what to mind |\n"
-      << "| `field`, `loss_split` | image-quality | the field; shares of the mean squared "
-         "difference |\n"
-      << "| `steps`, `common_starts`, `gold` | error-budget | what each part of the error moves "
-         "|\n";
+  page << "# Files\n\nThis page is made from the code (`tests/programs/reference_test.cpp`).\n\n"
+       << "## study.toml\n\n`af-inspect --template study` prints this:\n\n```toml\n"
+       << template_text("study") << "```\n\n## rig.toml\n\n`af-inspect --template rig` prints "
+       << "this:\n\n```toml\n"
+       << template_text("rig") << "```\n\n## scan.toml\n\n`af-inspect --template scan` prints "
+       << "this ([how it is used](../real-xrays.md)):\n\n```toml\n"
+       << template_text("scan") << "```\n\n## Fields (`.af.h5`)\n\n"
+       << "[field-format.md](field-format.md) states their format.\n"
+       << "\n## Results of af-register\n\nIn the folder of `--output`: "
+       << code_list(result_file_names())
+       << ", one `CAMERA-overlay.png` per view, and `slicer/`. Which of them are there depends on "
+       << "the verdict ([register/README.md](../../register/README.md)).\n\n"
+       << "## registrations.csv\n\nOne row per registration, with these columns; `af-evaluate` "
+       << "and `--correct` add more between them ([errors.md](../errors.md) defines the "
+       << "errors):\n\n"
+       << code_list(columns_of(registration_cells({}, {}, {})))
+       << "\n\nWith `--correct`: " << code_list(columns_of(correction_cells({})))
+       << ".\n\nWithout `--no-uncertainty` ([uncertainty.md](../uncertainty.md)): "
+       << code_list(columns_of(judge_cells({}))) << ", "
+       << code_list(columns_of(uncertainty_cells({}, 0.0))) << ".\n\n"
+       << "## summary.json\n\nIn the folder of a finished run of `af-evaluate`; `af-evaluate "
+       << "report` reads it. Numbers that are not known are null.\n\n"
+       << "| Key | Of which kinds | What |\n|---|---|---|\n"
+       << "| `format`, `format_version` | all | \"attenuation-fields evaluation\", 1 |\n"
+       << "| `kind` | all | \"registration\", \"image-quality\", \"field-parameters\", "
+          "\"similarity-curves\" or \"error-budget\" |\n"
+       << "| `provenance` | all | program and version, command line, options in force, seed, "
+          "SHA-256 of the inputs (`input_sha256`), where CTs lie (`input_grids`), how X-rays, CTs "
+          "and fields are read (`input_notes`), "
+          "host, start |\n"
+       << "| `figures`, `pictures` | all that draw | names of figures without ending; files of "
+          "pictures and what they show |\n"
+       << "| `study`, `method`, `success_tre_mm`, `start_rule`, `simulation` | registration | the "
+          "study's path; preset, similarity and optimisers; what a success and a start are; how "
+          "the study was simulated, or null |\n"
+       << "| `cases` | registration | per case its gold pose, region and starts |\n"
+       << "| `renderers` | registration, similarity-curves | per renderer successes, TRE, times "
+          "and their intervals; or the curves' maxima |\n"
+       << "| `field_against_raycast` | registration | the same starts by both renderers |\n"
+       << "| `row_problems`, `warnings` | registration | rows that failed, and what to mind |\n"
+       << "| `field`, `loss_split` | image-quality | the field; shares of the mean squared "
+          "difference |\n"
+       << "| `steps`, `common_starts`, `gold` | error-budget | what each part of the error moves "
+          "|\n";
   return page.str();
 }
 
@@ -140,6 +115,23 @@ TEST(Reference, OfEveryProgramIsWhatItPrints) {
 
 TEST(Reference, OfFilesIsWhatTheCodeKnows) {
   expect_page("files.md", file_page());
+}
+
+/// But for the datasets of tiles, whose extents the lattice decides: test_field_format.py has them.
+TEST(Reference, OfFieldFilesHasTheRulesOfTheCode) {
+  using namespace field_layout;
+  std::vector<std::string> texts = {
+      "format " + std::string(kFormat) + ", version " + std::to_string(kFormatVersion) + ".",
+      "1 to " + std::to_string(kMaxSlabs) + " depth slabs",
+      "1 to " + std::to_string(kMaxMembers) + " fields"};
+  for (const auto& rules : {payload_rules(1, {true, true}),
+                            range_rules(),
+                            provenance_rules(),
+                            {material_rule(), member_count_rule()}})
+    for (const DatasetRule& rule : rules) texts.push_back(row_of(rule));
+  const std::string page =
+      read_text_file(fs::path(AF_SOURCE_FOLDER) / "docs" / "reference" / "field-format.md");
+  for (const std::string& text : texts) EXPECT_NE(page.find(text), std::string::npos) << text;
 }
 
 }  // namespace

@@ -12,6 +12,8 @@ import sys
 import tempfile
 from pathlib import Path
 
+import numpy as np
+
 STUDY = Path(os.environ["AF_LIBRARY_STUDY"])
 
 
@@ -71,6 +73,26 @@ def register_a_phantom(example):
     expect(pixels.startswith(b"P5 768 256 255\n") and len(pixels) == 15 + 768 * 256, output)
 
 
+def decode_viewpoint(example):
+    # Viewpoints along u and along v as make_library_study states them.
+    for name, nodes in (("AP.af.h5", 24), ("AP.standard.af.h5", 7)):
+        levels = np.fromfile(STUDY / f"{name}.levels.u16", dtype="<u2")
+        for u, v in ((0, 0), (3, 4), (4, 3), (nodes - 1, nodes - 1)):
+            with tempfile.TemporaryDirectory() as folder:
+                saved = Path(folder, "samples.npz")
+                output = output_of(example, STUDY / name, u, v, saved)
+                with np.load(saved) as arrays:
+                    samples = list(arrays.values())
+            rest = levels
+            for of_viewpoint in samples:
+                of_slab = rest[: nodes * nodes * of_viewpoint.size]
+                rest = rest[of_slab.size :]
+                expected = of_slab.reshape(nodes, nodes, *of_viewpoint.T.shape)[u, v].T
+                expect(of_viewpoint.dtype == np.uint16 and expected.max() > 0, output)
+                expect(np.array_equal(of_viewpoint, expected), output)
+            expect(rest.size == 0, output)
+
+
 def evaluate_results(example):
     output = output_of(example, STUDY / "several" / "registrations.csv")
     expect("2 registrations of 1 cases" in output and "field: 2 of 2 succeed" in output, output)
@@ -84,6 +106,7 @@ if __name__ == "__main__":
             register_with_torch,
             register_a_phantom,
             evaluate_results,
+            decode_viewpoint,
         )
     }[sys.argv[2]]
     check(Path(sys.argv[1], sys.argv[2] + ".py"))
