@@ -1,8 +1,8 @@
 # shellcheck shell=bash disable=SC2034,SC2154  # variables pass between this file and its caller
 # SPDX-License-Identifier: Apache-2.0
 # What a study's chain consists of: a field for every view, the registrations of every case, a report. Sourced by
-# jobs/submit.sh (on Slurm) and jobs/run-study.sh (on this machine), so that both run the same commands. The caller has
-# sourced lib.sh and sets output, and maybe resources.
+# jobs/submit.sh (on Slurm) and jobs/run-study.sh (on this machine, and for jobs/Snakefile), so that all run the same
+# commands. The caller has sourced lib.sh and sets output, and maybe resources.
 
 study="" resources="$af_root/jobs/slurm/resources.sh"
 
@@ -70,3 +70,20 @@ evaluate_command() {
 }
 
 report_command() { command=("$bin/af-evaluate" report -o "$output/report.html" "$output/registration"); }
+
+# each_stage FUNCTION: calls FUNCTION KIND NAME for every stage, after those whose results it reads, with its command in
+# `command`.
+each_stage() {
+  local case_name view command
+  for case_name in "${case_names[@]}"; do
+    for ((view = 0; view < most_views; ++view)); do
+      precompute_command "$case_name" "$view"
+      [[ "${command[0]}" != true ]] || continue
+      "$1" precompute "$(basename "$(result_of "${command[@]}")" .af.h5)"
+    done
+    evaluate_command "$case_name"
+    "$1" evaluate "$case_name"
+  done
+  report_command
+  "$1" report report
+}

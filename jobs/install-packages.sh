@@ -28,7 +28,8 @@ lint_packages=(shellcheck chromium groff-base bsdextrautils zsh hdf5-tools)
 bookworm_lint_packages=(clang-format-14 clang-tidy-14)
 # Large, and only one test and one example of the Python module need it; they are skipped without it.
 torch_packages=(python3-torch)
-slurm_packages=(slurm-wlm munge)
+# What runs jobs on a cluster.
+slurm_packages=(slurm-wlm munge snakemake)
 
 usage() {
   cat <<'TEXT'
@@ -42,7 +43,7 @@ Installs the packages that the project needs to build, run and pass its tests on
                       manual pages, completions and fields (shellcheck, chromium, groff-base, bsdextrautils,
                       zsh, hdf5-tools, and clang-format-14 and clang-tidy-14, which Debian 13 does not have)
   --with-benchmarks   also what tests/benchmark/run.sh compares with (plastimatch, Faiss, OpenBLAS)
-  --with-slurm        also a Slurm of one node, for tests/slurm
+  --with-slurm        also a Slurm of one node, for tests/slurm, and Snakemake, for jobs/Snakefile
   --with-torch        also PyTorch, for the test and the example of differentiable DRRs
   --with-peers        also what jobs/peers.sh compares with (plastimatch, elastix, PyTorch, NLopt for Python)
   --check             only say what is missing; exit 1 when something is

@@ -60,33 +60,60 @@ progress_of() { echo "$(value_of -o "$@").progress"; }
 # bytes_in FOLDER: the size of all files together; 0 when there is none.
 bytes_in() { { find "$1" -type f -printf '%s\n' 2>/dev/null || true; } | awk '{sum += $1} END {print sum + 0}'; }
 
+# parts_of PATH: sets parts to the path and, where it is a header, to the voxels beside it.
+parts_of() {
+  parts=("$1")
+  [[ "$1" != *.mhd && "$1" != *.nhdr ]] || parts=("${1%.*}".*)
+}
+
 # state_of PATH...: name, size and time of a file (also of the voxels beside a header) or of all files of a folder; for
 # a missing file, that it is missing.
 state_of() {
-  local path paths
+  local path parts
   for path in "$@"; do
-    paths=("$path")
-    [[ "$path" != *.mhd && "$path" != *.nhdr ]] || paths=("${path%.*}".*)
-    find -L "${paths[@]}" -type f -printf '%p %s %T@\n' 2>&1 | LC_ALL=C sort || true
+    parts_of "$path"
+    find -L "${parts[@]}" -type f -printf '%p %s %T@\n' 2>&1 | LC_ALL=C sort || true
   done
 }
 
-# inputs_of AF_INSPECT COMMAND...: a hash of the study, of the state of its case's CT, X-rays, masks and rig, and of the
-# fields that the command reads.
-inputs_of() {
-  local inspect=$1 study case_name lines name path paths=()
+# read_by LISTED COMMAND...: sets read_paths to the CT, X-rays, masks and rig of the command's case, and to the fields
+# that it reads. LISTED is what `af-inspect --list-inputs` says of the study.
+read_by() {
+  local listed=$1 case_name name path
   shift
-  study=$(value_of --study "$@")
+  read_paths=()
   case_name=$(value_of --case "$@")
-  lines=$("$inspect" --list-inputs "$study") || return
   while IFS=$'\t' read -r name path; do
-    [[ "$name" != "$case_name" ]] || paths+=("$path")
-  done <<<"$lines"
+    [[ "$name" != "$case_name" ]] || read_paths+=("$path")
+  done <<<"$listed"
   while (($# > 1)); do
-    [[ "$1" != --field ]] || paths+=("${2#*=}")
+    [[ "$1" != --field ]] || read_paths+=("${2#*=}")
     shift
   done
-  { sha256sum <"$study" && state_of "${paths[@]}"; } | sha256sum
+}
+
+# inputs_of AF_INSPECT COMMAND...: a hash of the study, and of the state of the other files that the command reads.
+inputs_of() {
+  local inspect=$1 study listed read_paths
+  shift
+  study=$(value_of --study "$@")
+  listed=$("$inspect" --list-inputs "$study") || return
+  read_by "$listed" "$@"
+  { sha256sum <"$study" && state_of "${read_paths[@]}"; } | sha256sum
+}
+
+# set_launch STAGE: sets launch to the words that start the ranks of a stage in a Slurm job, as the resources say.
+# shellcheck disable=SC2034,SC2154  # the caller reads launch, and has read the resources
+set_launch() {
+  case "$launcher-$1" in
+    *-report) launch=() ;;
+    srun-*) launch=(srun "${srun_options[@]}" --kill-on-bad-exit=1) ;;
+    mpirun-*) launch=(mpirun "${mpirun_options[@]}") ;;
+    *)
+      echo "resources.sh: launcher = '$launcher' must be srun or mpirun" >&2
+      exit 2
+      ;;
+  esac
 }
 
 # open_output DIR: makes the folder, sets output to its full path and keeps other runs out of it.

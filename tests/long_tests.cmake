@@ -7,7 +7,7 @@ set(af_long_tests
     Pages atlas_program bad_inputs bones checks.scripts convert.mutations convert.program evaluate_program_tests
     evaluate_stops_tests fault_tests help_formats_tests kill_matrix_tests launch_tests leak_tests library_installed_example
     library_study library_test measured_fields_tests population_program precompute_program python real_xrays_program register_program_tests
-    report_program scan_program_tests simulate_program_tests spectrum_program_tests viewpoint_cylinder_test
+    report_program scan_program_tests simulate_program_tests snakemake_program spectrum_program_tests viewpoint_cylinder_test
     # Single tests of more than three seconds
     AfInspect.DrawsOneDrrWhereRoughLandmarksGiveTheNominalPose
     AfInspect.DrawsPicturesOfACtAndOfAStudy

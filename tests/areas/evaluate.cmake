@@ -53,3 +53,7 @@ af_add_test(
 add_test(NAME population_program COMMAND ${PROJECT_SOURCE_DIR}/tests/programs/population_program.sh
                                          ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR}/bin)
 set_tests_properties(population_program PROPERTIES LABELS mpi TIMEOUT 900)
+
+add_test(NAME snakemake_program COMMAND ${PROJECT_SOURCE_DIR}/tests/programs/snakemake_program.sh
+                                        ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR}/bin)
+set_tests_properties(snakemake_program PROPERTIES LABELS mpi TIMEOUT 900 SKIP_RETURN_CODE 77)

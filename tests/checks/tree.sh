@@ -6,7 +6,7 @@ set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
 source "$(dirname "$0")/source_files.sh"
 root=$1
-mapfile -d '' -t files < <(list_sources "$root" '*.h' '*.cpp' '*.in' '*.txt' '*.cmake' '*.sh' '*.py' '*.pyi' '*.md' '*.toml' '*.json')
+mapfile -d '' -t files < <(list_sources "$root" '*.h' '*.cpp' '*.in' '*.txt' '*.cmake' '*.sh' '*.py' '*.pyi' '*.md' '*.toml' '*.json' '*Snakefile')
 ((${#files[@]} > 0)) || { echo "no sources found below $root" >&2; exit 1; }
 cd "$root"
 failed=no
@@ -30,7 +30,7 @@ for file in "${files[@]}"; do
     failed=yes
   fi
   case "$file" in
-    *.h | *.cpp | *.cmake | *.sh | *.py | *.pyi | */CMakeLists.txt | CMakeLists.txt)
+    *.h | *.cpp | *.cmake | *.sh | *.py | *.pyi | */CMakeLists.txt | CMakeLists.txt | */Snakefile)
       if ! head -n 3 "$file" | grep -q 'SPDX-License-Identifier: Apache-2.0'; then
         echo "$file: no SPDX line" >&2
         failed=yes

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # jobs/submit.sh on a real Slurm of one node: a study of two patients from CT to report, once undisturbed and once with
 # a field and a case's registrations stopped by Slurm's TERM, queued again and finished; both must have given the same.
+# So must jobs/Snakefile, as jobs of the same Slurm, one of which is stopped.
 # Usage: chain_test.sh [SCRATCH_FOLDER]. Needs root, the release build and jobs/install-packages.sh --with-slurm.
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
@@ -12,6 +13,7 @@ mkdir -p "$scratch"
 slurm="$af_root/tests/slurm/one-node-slurm.sh"
 bin=$(program_folder)
 need_programs "$bin" af-simulate af-evaluate af-inspect af-precompute
+command -v snakemake >/dev/null || die 1 "snakemake is missing: jobs/install-packages.sh --with-slurm"
 
 finish() {
   local status=$?
@@ -152,10 +154,36 @@ wait_until "the chain after a cancelled one" no_jobs_left
 grep -q 'goes on after' "$disturbed/logs/evaluate-1.log" || fail "nothing of the cancelled job was taken over"
 [[ "$(rows_of "$disturbed")" == "$(rows_of "$undisturbed")" ]] || fail "the rows differ after the cancelled job"
 
+# By Snakemake. What runs when the first rows are there gets the TERM that Slurm sends before a time limit, and is
+# submitted again.
+by_snakemake=$scratch/run-snakemake
+mkdir -p "$scratch/profile" "$by_snakemake/logs"
+cat >"$scratch/profile/config.yaml" <<TEXT
+slurm: true
+jobs: 4
+restart-times: 3
+max-status-checks-per-second: 1
+TEXT
+(cd "$scratch" && USER=$(id -un) exec snakemake --snakefile "$af_root/jobs/Snakefile" --profile "$scratch/profile" \
+  --config study=study.toml resources=resources.sh output="$by_snakemake") >"$by_snakemake/logs/snakemake.log" 2>&1 &
+snakemake=$!
+if [[ "${LAUNCHER:-srun}" == srun ]]; then
+  rows=$by_snakemake/registration/patient-1.progress/patient-1-field.0000-000000.records
+  wait_until "$rows" test -s "$rows"
+  scancel --signal=TERM --state=RUNNING --user="$(id -un)"
+fi
+wait "$snakemake" || fail "snakemake ended with $?"
+[[ -s "$by_snakemake/report.html" ]] || fail "no report.html of Snakemake's run"
+if [[ "${LAUNCHER:-srun}" == srun ]]; then
+  grep -q 'goes on after' "$by_snakemake/logs/registration-patient-1.log" || fail "Snakemake's job did not go on after its stop"
+fi
+[[ "$(payloads_of "$by_snakemake")" == "$(payloads_of "$undisturbed")" ]] || fail "the fields of Snakemake's run differ"
+[[ "$(rows_of "$by_snakemake")" == "$(rows_of "$undisturbed")" ]] || fail "the rows of Snakemake's run differ"
+
 # And without Slurm.
 local_run=$scratch/run-local
 "$af_root/jobs/local.sh" "$scratch/study.toml" --resources "$scratch/resources.sh" --output "$local_run" --ranks 2
 [[ -s "$local_run/report.html" ]] || fail "no report.html of the local run"
 [[ "$(payloads_of "$local_run")" == "$(payloads_of "$undisturbed")" ]] || fail "the fields of the local run differ"
 [[ "$(rows_of "$local_run")" == "$(rows_of "$undisturbed")" ]] || fail "the rows of the local run differ"
-say "chain_test: a stopped chain gave the same fields and rows as an undisturbed one, and as jobs/local.sh"
+say "chain_test: a stopped chain gave the same fields and rows as an undisturbed one, as Snakemake, and as jobs/local.sh"
