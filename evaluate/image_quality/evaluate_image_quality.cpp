@@ -438,8 +438,8 @@ void ImageQualityOptions::describe(Fields& field_list) {
   field_list("case", cases, "Case of the study, may be repeated (default: all)");
   field_list("rig",
              rig,
-             "With --camera: look through another camera than the field's, whose rays it has to "
-             "hold; random poses are then drawn where it does [the field's own camera]")
+             "With --camera: look through another camera, whose rays the field holds [the field's "
+             "own camera]")
       .excludes({"--study"})
       .needs({"--camera"})
       .input();
@@ -456,8 +456,8 @@ void ImageQualityOptions::describe(Fields& field_list) {
       .choice(field_look_up_names());
   field_list("split_loss_poses",
              split_loss_poses,
-             "Split the loss at so many of the poses into interpolation over (u,v), over (s,t), "
-             "and quantisation; some ten ray-cast DRRs each")
+             "Split the loss at so many poses into interpolation and quantisation; some ten "
+             "ray-cast DRRs each")
       .at_least(0);
   field_list.part(ray_caster);
   field_list.part(beam);

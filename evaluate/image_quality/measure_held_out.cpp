@@ -184,7 +184,7 @@ void HeldOutOptions::describe(Fields& field_list) {
   field_list.part(ct_reading);
   field_list.part(ray_caster);
   field_list(
-      "look_up", look_up, "How DRRs are looked up [each field's own way]. " + field_look_up_help())
+      "look_up", look_up, "How DRRs are looked up [the field's own way]. " + field_look_up_help())
       .choice(field_look_up_names());
   field_list("threads", threads, "Threads; 0: every processor").within(0, 1024);
   field_list("output",

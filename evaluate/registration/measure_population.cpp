@@ -35,9 +35,8 @@ void write_population(const PopulationOptions& options,
 void PopulationOptions::describe(Fields& field) {
   field("condition",
         conditions,
-        "NAME=FOLDER: finished registration runs of one condition, of any number of patients, "
-        "searched with all below the folder. NAME is VARIANT-VIEWS-PRESET for the figures. May be "
-        "repeated")
+        "VARIANT-VIEWS-PRESET=FOLDER: finished registration runs of one condition, in and below "
+        "the folder; may be repeated")
       .required()
       .one_at_a_time();
   field("seed", seed, "Seed of the bootstrap");

@@ -23,11 +23,8 @@ void ScanOptions::describe(Fields& field) {
       .within(64, 4096);
   field("enlarge_small",
         enlarges_small,
-        "Multiply all lengths of a small scan by a whole number, until the detector sees 60 mm "
-        "across "
-        "at the axis and the source is 200 mm from it: registrations begin tens of mm away. "
-        "Lengths of "
-        "the study, and errors, are then enlarged ones; calibration.toml has the number");
+        "Multiply a small scan's lengths, and so errors, by a whole number, which calibration.toml "
+        "states, until the detector sees 60 mm");
   field("pairs",
         pairs,
         "Pairs of X-rays about 90 degrees apart, evenly around the circle; the first X-ray of each "
@@ -44,15 +41,13 @@ void ScanOptions::describe(Fields& field) {
       .within(0.0, 100.0);
   field("mask_deviations",
         mask_deviations,
-        "Places where an X-ray differs from its prediction by more than so many times what is "
-        "expected there (its robust standard deviation, and a tenth of the predicted detail) are "
-        "masked: something moved during the scan; 0: no masks")
+        "Mask places where an X-ray differs from its prediction by more than so many standard "
+        "deviations; 0: no masks")
       .within(0.0, 1000.0);
   field("write_projections",
         writes_projections,
-        "Write every view, too: projections.toml is a study whose case 'measured' has the even "
-        "views, for af-precompute --projections, and 'held-out' the odd ones, for af-evaluate "
-        "held-out");
+        "Write every view, too: projections.toml has the cases 'measured', for af-precompute "
+        "--projections, and 'held-out', for af-evaluate held-out");
   field("seed", seed, "Seed of the nominal poses");
   field("threads", threads, "Threads; 0: every processor")
       .within(0, 1024)

@@ -256,9 +256,8 @@ void SelfCalibrationOptions::describe(Fields& field) {
       .within(32, 4096);
   field("focal_share",
         focal_share,
-        "The detector's distance is sought within this share of the stated one; 0: kept. "
-        "Projections hardly determine it, and all lengths of the CT scale with it. Default: the "
-        "scan's distance_tolerance")
+        "The detector's distance, which scales all lengths, is sought within this share of the "
+        "stated one; 0: kept. Default: the scan's distance_tolerance")
       .within(0.0, 0.3);
   field("tilt_deg", tilt_deg, "The detector's tilt is sought within so many degrees; 0: kept")
       .within(0.0, 10.0);

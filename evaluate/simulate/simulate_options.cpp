@@ -57,9 +57,8 @@ void describe_target(Fields& field, SimulateOptions& o) {
   field.start_group("Target");
   field("center_ct_mm",
         o.center_ct_mm,
-        "ROI centre x,y,z in ct coordinates (LPS, mm), placed at the isocentre by the nominal "
-        "pose. Default: the middle vertebra of the phantom; of a CT, the bone-rich place nearest "
-        "its middle")
+        "ROI centre x,y,z (LPS, mm), which the nominal pose puts at the isocentre. Default: the "
+        "phantom's middle vertebra, or the bone-rich place nearest the CT's middle")
       .count(3)
       .comma_separated();
   field("target_box_ct_mm",
@@ -72,8 +71,8 @@ void describe_target(Fields& field, SimulateOptions& o) {
         "Phantoms only: the target is this bone, one of those that --moved-bone takes");
   field("roi_px",
         o.roi_px,
-        "Width,height of the region of interest on each detector, centred on the projected target. "
-        "Default: 200,200 (at most 60 % of the detector), more if the projected box needs it")
+        "Width,height of the region of interest about the projected target. Default: 200,200, at "
+        "most 60 % of the detector, or more for the target box")
       .at_least(16)
       .count(2)
       .comma_separated();
@@ -92,10 +91,8 @@ void describe_truth(Fields& field, SimulateOptions& o) {
       .within(0.0, 1000.0);
   field("moved_bone",
         o.moved_bone,
-        "Phantoms only: the X-rays, which are then of the bodies themselves, show this bone turned "
-        "by 2 to 5 degrees and moved by 2 to 6 mm against the rest, as --seed has it; the CT does "
-        "not. The bone is then the target, the true pose is its own, and the draws above are of "
-        "the rest. " +
+        "Phantoms only: X-rays show this bone, the target, turned by 2 to 5 degrees and moved by 2 "
+        "to 6 mm against the rest; the true pose is the bone's. " +
             bone_help());
   field("no_fiducials", o.omits_fiducials, "No steel pins (four of 2 x 6 mm otherwise)");
 }
@@ -204,13 +201,10 @@ Phantom phantom_of(const SimulateOptions& options) {
 }
 
 void ConeBeamOptions::describe(Fields& field) {
-  field(
-      "cone_beam",
-      views,
-      "Take this many X-rays on a circle about the CT's centre, by the rig's first camera, and "
-      "write a scan for af-scan: "
-      "scan.toml, an X-ray per view, and ct.nii.gz; X-rays of a phantom show its exact shapes, not "
-      "voxels. 0: a study")
+  field("cone_beam",
+        views,
+        "Write a scan for af-scan: this many X-rays on a circle about the CT's centre, by the "
+        "rig's first camera; 0: a study")
       .within(0, 100000);
   field(
       "elevations_deg",

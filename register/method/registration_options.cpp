@@ -114,10 +114,7 @@ std::string stage_text(const StageOptions& stage) {
 }  // namespace
 
 void StageOptions::describe(Fields& field) {
-  field("level",
-        level,
-        "of the pyramid. 0: the field itself; above, nodes 2^level as far apart as in a field of "
-        "about 256, X-rays blurred to match")
+  field("level", level, "of the pyramid, each twice as coarse; 0: the field itself")
       .within(0, kCoarsestLevel);
   field("pixel_step", pixel_step, "detector pixels per stage pixel, along each axis")
       .as("pixels")
@@ -127,14 +124,14 @@ void StageOptions::describe(Fields& field) {
       .within(0.1, 4.0);
   field("smoothing_sigma_mm",
         smoothing_sigma_mm,
-        "mm on the isocentre plane: Gaussian on the X-rays (not on the DRRs), besides the level's")
+        "mm on the isocentre plane: Gaussian on the X-rays, besides the level's")
       .as("sigma")
       .at_least(0.0)
       .finite();
   field("silhouette_mm",
         silhouette_mm,
-        "mm on the isocentre plane: only the part of the region within this distance of the CT's "
-        "silhouette at the start of the stage counts; 0: all of the region")
+        "mm on the isocentre plane: only what is this near to the CT's silhouette counts; 0: the "
+        "whole region")
       .as("silhouette")
       .within(0.0, 100.0);
   field.part(similarity);
