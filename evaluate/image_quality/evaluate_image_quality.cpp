@@ -430,11 +430,7 @@ void write_together(const std::vector<TargetResult>& results, const std::filesys
 void ImageQualityOptions::describe(Fields& field_list) {
   field_list("field", field, "Field file of one camera").input();
   field_list("ct", ct, "The CT the field was made from: image file or DICOM folder").input();
-  field_list("study",
-             study,
-             "Instead of both: study.toml whose views name their fields (key `field`); one box "
-             "plot of all, the worst pairs side by side")
-      .input();
+  field_list("study", study, "Instead of both: study.toml whose views name their fields").input();
   field_list("case", cases, "Case of the study, may be repeated (default: all)");
   field_list("rig",
              rig,
@@ -514,12 +510,11 @@ void run_image_quality(const ImageQualityOptions& options,
 }  // namespace
 
 cli::SubCommand image_quality_command(CLI::App& app) {
-  cli::SubCommand command = cli::sub_command(
-      app,
-      "image-quality",
-      "DRRs of a field against ray casting at random poses of its motion range (the paper's Fig. "
-      "8): PSNR, statistics, box plot, worst pair",
-      run_image_quality);
+  cli::SubCommand command = cli::sub_command(app,
+                                             "image-quality",
+                                             "DRRs of a field against ray casting at random poses "
+                                             "of its range: PSNR, box plot, worst pair",
+                                             run_image_quality);
   cli::bind_run_limits(*command.app);
   return command;
 }

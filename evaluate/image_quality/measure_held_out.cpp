@@ -245,8 +245,7 @@ cli::SubCommand held_out_command(CLI::App& app) {
   return cli::sub_command(
       app,
       "held-out",
-      "How well fields, and ray casting through their CT, predict X-rays whose true pose is known: "
-      "PSNR with the X-ray as the reference, per view and as a table",
+      "How well fields and ray casting predict X-rays of known pose: PSNR, per view and as a table",
       run_held_out);
 }
 

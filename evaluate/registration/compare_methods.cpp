@@ -74,12 +74,11 @@ void run_compare(const CompareOptions& options,
 }  // namespace
 
 cli::SubCommand compare_command(CLI::App& app) {
-  return cli::sub_command(
-      app,
-      "compare",
-      "One table of finished registration runs: success for starts 0-8, 8-16 and 16-30 mm from "
-      "gold, TRE, bias, DRRs and seconds, and field against ray casting, as Markdown and CSV",
-      run_compare);
+  return cli::sub_command(app,
+                          "compare",
+                          "One table of finished registration runs: success by distance of the "
+                          "start, TRE, bias, DRRs and seconds, as Markdown and CSV",
+                          run_compare);
 }
 
 }  // namespace af::evaluation

@@ -524,13 +524,12 @@ void run_registration(const RegistrationStudyOptions& options,
 cli::SubCommand registration_command(CLI::App& app, const std::string& program) {
   auto options = std::make_shared<RegistrationStudyOptions>();
   options->program = program;
-  cli::SubCommand command = cli::sub_command(
-      app,
-      "registration",
-      "Registers the cases of a study from starts at stated distances from the gold pose and "
-      "reports TRE and success (the paper's Table II, Figs. 15 and 16)",
-      run_registration,
-      options);
+  cli::SubCommand command = cli::sub_command(app,
+                                             "registration",
+                                             "Registers a study's cases from starts at stated "
+                                             "distances from the gold pose, for TRE and success",
+                                             run_registration,
+                                             options);
   cli::bind_run_limits(*command.app);
   command.app->parse_complete_callback([options, app = command.app] {
     options->shared_by_repeats = cli::given_options(*app, not_of_repeats);

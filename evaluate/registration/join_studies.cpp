@@ -81,8 +81,7 @@ cli::SubCommand join_studies_command(CLI::App& app) {
   return cli::sub_command(
       app,
       "join-studies",
-      "One study.toml of the cases of several, which must have the same cameras: a study of many "
-      "patients, for `registration`, `image-quality` and `field-parameters`",
+      "One study.toml of the cases of several, which must have the same cameras",
       run_join_studies);
 }
 

@@ -12,10 +12,7 @@ void ScanOptions::describe(Fields& field) {
       .input()
       .required();
   field("folder", folder, "Where the scan's images are; default: beside the scan's file");
-  field("output",
-        output,
-        "Study folder to make: study.toml, rig.toml, ct.nii.gz, calibration.toml, held-out.csv, "
-        "X-rays, masks, pictures, provenance.json, reproduce.sh. Appears when complete")
+  field("output", output, "Study folder to make; appears when complete")
       .as("-o,--output")
       .required();
   field("force", replaces_output, "Replace the folder if it exists");
@@ -27,8 +24,7 @@ void ScanOptions::describe(Fields& field) {
         "states, until the detector sees 60 mm");
   field("pairs",
         pairs,
-        "Pairs of X-rays about 90 degrees apart, evenly around the circle; the first X-ray of each "
-        "is a case of one view, too")
+        "Pairs of X-rays about 90 degrees apart; the first of each is a case of one view, too")
       .within(1, 1000);
   field("max_offset_rotation_deg",
         max_offset_rotation_deg,

@@ -243,8 +243,7 @@ AngleBasis SelfCalibrationOptions::basis_for(const CircularScan& scan,
 void SelfCalibrationOptions::describe(Fields& field) {
   field("harmonics",
         harmonics,
-        "Harmonics of the view angle in which the beam's foot and the detector's rotation may "
-        "change; at most one per 16 views")
+        "Harmonics of the view angle in which the detector may move; at most one per 16 views")
       .within(0, 12);
   field("rounds", rounds, "Rounds of reconstructing, predicting and moving cameras").within(1, 100);
   field.leave_out(coarse_px, "one value suits every scan");

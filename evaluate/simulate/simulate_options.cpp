@@ -30,17 +30,13 @@ void describe_patient(Fields& field, SimulateOptions& o) {
 }
 
 void describe_output(Fields& field, SimulateOptions& o) {
-  field("output",
-        o.output,
-        "Study folder to make: study.toml, rig.toml, truth.toml, one X-ray per camera, previews, "
-        "provenance.json, reproduce.sh. Appears when complete")
+  field("output", o.output, "Study folder to make; appears when complete")
       .as("-o,--output")
       .required();
   field("force", o.replaces_output, "Replace the folder if it exists");
   field("copy_ct",
         o.copies_ct,
-        "Write the CT into the study as ct.nii.gz; otherwise a --ct is referred to by its absolute "
-        "path (a phantom is always written)");
+        "Write the CT into the study as ct.nii.gz, as a phantom always is, instead of its path");
   field("xray_format",
         o.xray_format,
         "Format of the X-rays: mha; dicom: XA, MONOCHROME1, 8 to 16 bits, with the positioner's "
@@ -224,10 +220,8 @@ void SimulateOptions::describe(Fields& field) {
   describe_target(field, *this);
   describe_truth(field, *this);
   field.start_group("Imaging (0 switches an effect off)");
-  field("ideal",
-        is_ideal,
-        "All effects off: one energy, no scatter, noise, blur or quantisation; float pixels. Use "
-        "with --no-fiducials for pure line integrals");
+  field(
+      "ideal", is_ideal, "All effects off, float pixels; with --no-fiducials pure line integrals");
   field.start_group("");
   field.part(xray);
   field.start_group("Stress (what real X-rays have)");

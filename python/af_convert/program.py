@@ -38,7 +38,7 @@ def parser():
     result = argparse.ArgumentParser(
         prog="af-convert", allow_abbrev=False,
         description="Converts cameras, poses and studies of other programs to rig.toml, poses and study.toml, and back. A file's "
-        "content decides what it is. What a file holds beyond what is read of it is named in a warning, or refused.")
+        "content decides what it is.")
     # So that -10.5,20,30 is a value, with a blank before it, too.
     result._negative_number_matcher = re.compile("-[0-9.]")
     result.add_argument("files", nargs="+", metavar="FILE", help="camera files to make one rig of, each of any of the formats; or a "

@@ -112,8 +112,8 @@ void describe_output(Fields& field, DrrOptions& options) {
         "Threads that share a large DRR, or the DRRs of --poses; 0: every processor");
   field("output",
         options.output,
-        "OUT.mha, .nii.gz, .nrrd, .tif: total attenuation, float32, not scaled; OUT.png: 8 bits, "
-        "row 0 on top, bright is attenuated")
+        "OUT.mha, .nii.gz, .nrrd, .tif: total attenuation, float32; OUT.png: 8 bits, bright is "
+        "attenuated")
       .as("-o,--output")
       .stands_for(PathRole::OutputVolume, ".nrrd")
       .required();
