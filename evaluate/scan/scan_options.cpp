@@ -28,8 +28,8 @@ void ScanOptions::describe(Fields& field) {
       .within(1, 1000);
   field("max_offset_rotation_deg",
         max_offset_rotation_deg,
-        "A case's nominal pose is turned from the true one by a uniform draw of at most this about "
-        "each axis, degrees")
+        "Nominal poses are turned from the true one by a uniform draw of at most this about each "
+        "axis, degrees")
       .within(0.0, 30.0);
   field("max_offset_translation_mm",
         max_offset_translation_mm,

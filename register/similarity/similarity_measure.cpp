@@ -142,9 +142,7 @@ void SimilarityOptions::describe(Fields& field) {
       // Smooth windows are four bins wide.
       .within(has_smooth_histogram ? 4 : 2, kMaxHistogramBins);
   field.leave_out(has_smooth_histogram, "follows from the optimiser");
-  field("residual_scale",
-        residual_scale,
-        "rg: residuals of this many times the typical X-ray gradient count half")
+  field("residual_scale", residual_scale, "rg: residuals of this many typical gradients count half")
       .as("scale")
       .above(0.0)
       .finite();
