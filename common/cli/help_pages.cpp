@@ -37,11 +37,18 @@ std::string value_text(const OptionHelp& option) {
   return option.value_word + (option.is_repeated ? " ..." : "");
 }
 
+/// The text says of every choice what it is, as in "fast: ...".
+bool explains_choices(const OptionHelp& option) {
+  return std::all_of(option.choices.begin(), option.choices.end(), [&](const std::string& choice) {
+    return option.text.find(choice + ": ") != std::string::npos;
+  });
+}
+
 /// What the option does and accepts, as sentences.
 std::string sentences(const OptionHelp& option) {
   std::string text = option.text;
   if (!option.choices.empty())
-    text += ". One of: " + joined(option.choices);
+    text += explains_choices(option) ? "" : ". One of: " + joined(option.choices);
   else if (!option.constraint.empty())
     text += ". Must be " + option.constraint;
   if (option.is_required) text += ". Required";

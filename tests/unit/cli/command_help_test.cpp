@@ -98,6 +98,14 @@ TEST(MarkdownPage, HasARowForEveryOption) {
   EXPECT_THAT(page, HasSubstr("| `--exact` |  |  | A flag |\n"));
 }
 
+TEST(MarkdownPage, ListsChoicesThatTheTextDoesNotExplain) {
+  CommandHelp program = shown_help();
+  for (OptionHelp& option : program.options)
+    if (option.long_name() == "--way") option.text = "quick: soon; exact: later";
+  EXPECT_THAT(markdown_page(program),
+              HasSubstr("| `--way` | `TEXT` | `quick` | quick: soon; exact: later |\n"));
+}
+
 TEST(MarkdownPage, NamesOptionsThatAnEarlierCommandHasAlike) {
   CommandHelp program = shown_help();
   CommandHelp command{"again", "Shows more.", program.options, {}};
