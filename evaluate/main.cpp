@@ -26,8 +26,8 @@
 int main(int argc, char** argv) {
   using namespace af::evaluation;
   CLI::App app{
-      "Measures attenuation fields and registrations, as a paper would report them. Runs alone or "
-      "under mpirun; the numbers do not depend on the rank count."};
+      "Measures attenuation fields and registrations, alone or under mpirun, with the same "
+      "numbers."};
   app.require_subcommand(1);
   const std::string program = af::shell_quoted(argv[0]);
   const std::vector<af::cli::SubCommand> commands = {image_quality_command(app),

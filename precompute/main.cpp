@@ -12,9 +12,8 @@ int main(int argc, char** argv) {
   af::PrecomputeOptions options;
   CLI::App app{
       "Makes an attenuation field: all line integrals through a CT that one camera can see while "
-      "the CT moves within a range, vector-quantised, in one HDF5 file. Run it alone or under "
-      "mpirun; the result does not depend on the number of ranks. Stopped by SIGUSR1 or killed, it "
-      "continues where it was when the same command is run again."};
+      "the CT moves within a range. It runs alone or under mpirun, with the same result; stopped, "
+      "the same command continues."};
   af::cli::bind_options(app, options);
   af::cli::bind_run_limits(app);
   const std::string command = af::cli::command_line(argc, argv);

@@ -43,13 +43,9 @@ std::string optimizer_list() {
 int main(int argc, char** argv) {
   af::registration::RegisterOptions options;
   CLI::App app{
-      "Finds the pose of a CT in the room from calibrated X-rays (2D-3D registration).\n"
-      "Writes result.json, pose.toml, result.tfm (ct_from_room, for Slicer), one overlay picture "
-      "per view, slicer/ (a folder that 3D Slicer loads; --no-pictures leaves out both) and "
-      "reproduce.sh; with --starts also registrations.csv. A verdict says whether the pose is "
-      "found, doubtful or not found. "
-      "When it is not found for every start, the exit code is 7, and result.tfm, pose.toml and "
-      "slicer/ are not written."};
+      "Finds the pose of a CT in the room from calibrated X-rays (2D-3D registration).\nA verdict "
+      "says whether the pose is found, doubtful or not found. When no start finds it, the exit "
+      "code is 7 and no pose is written."};
   af::cli::bind_options(app, options);
   af::cli::bind_run_limits(app);
   af::cli::bind_lists(app, {{"measures", measure_list()}, {"optimizers", optimizer_list()}});

@@ -17,9 +17,8 @@ void describe_start(Fields& field, RegisterOptions& options) {
         "Start: tx,ty,tz along the room's axes, mm, relative to nominal (default 0,0,0)");
   field("start",
         options.start,
-        "Start when no other is given: nominal, landmarks (the pose that the study's "
-        "landmarks_ct_mm and landmarks_px give), or auto: landmarks where the case has them, else "
-        "nominal")
+        "Start when no other is given: nominal; landmarks, from landmarks_ct_mm and landmarks_px; "
+        "auto: landmarks where there are any")
       .choice({"auto", "nominal", "landmarks"});
   field("start_pose",
         options.start_pose,
@@ -27,9 +26,8 @@ void describe_start(Fields& field, RegisterOptions& options) {
       .stands_for(PathRole::InputTransform, ".tfm");
   field("starts",
         options.starts,
-        "Many starts: CSV with rx_deg,ry_deg,rz_deg,tx_mm,ty_mm,tz_mm relative to nominal or m00 "
-        "... m23 of room_from_ct, or another file of poses (docs/poses.md); under mpirun the ranks "
-        "share them")
+        "Many starts, shared by ranks: CSV with rx_deg ... tz_mm relative to nominal, or another "
+        "file of poses (docs/poses.md)")
       .stands_for(PathRole::InputFile, ".csv")
       .input();
 }

@@ -56,18 +56,17 @@ void add_help_formats(CLI::App& app) {
            const std::string text = help_as(app, format);
            throw CLI::CallForVersion(text.substr(0, text.find_last_not_of('\n') + 1), 0);
          },
-         "Print this help as a page of Markdown, a manual page, or a completion for a shell, and "
-         "exit")
+         "Print this help as Markdown, a manual page or a shell completion, and exit")
       ->check(CLI::IsMember({"markdown", "man", "bash", "zsh"}))
       ->trigger_on_parse();
 }
 
 /// For every command.
 void add_no_lock(CLI::App& app) {
-  app.add_flag_callback("--no-lock",
-                        write_without_locks,
-                        "Take no locks of outputs, and heed none (OUTPUT.lock): where the file "
-                        "system has no locks, or a job that held one on another host is gone");
+  app.add_flag_callback(
+      "--no-lock",
+      write_without_locks,
+      "Neither take nor heed locks of outputs (OUTPUT.lock), for file systems that have none");
   for (CLI::App* command : app.get_subcommands([](CLI::App*) { return true; }))
     if (!command->get_name().empty()) add_no_lock(*command);
 }

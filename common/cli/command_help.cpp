@@ -132,6 +132,8 @@ void add_options(const CLI::App& app, const std::string& group, CommandHelp& hel
   for (const CLI::Option* option : app.get_options()) {
     const std::string& own = option->get_group();
     if (own.empty()) continue;  // hidden
+    // CLI11 gives a group of options a --help of its own; the program's is enough.
+    if (!group.empty() && option == app.get_help_ptr()) continue;
     help.options.push_back(option_help(app, *option, !group.empty() ? group : own));
   }
 }

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cctype>
+#include <set>
+#include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -35,11 +37,18 @@ std::string value_text(const OptionHelp& option) {
   return option.value_word + (option.is_repeated ? " ..." : "");
 }
 
+/// The text says of every choice what it is, as in "fast: ...".
+bool explains_choices(const OptionHelp& option) {
+  return std::all_of(option.choices.begin(), option.choices.end(), [&](const std::string& choice) {
+    return option.text.find(choice + ": ") != std::string::npos;
+  });
+}
+
 /// What the option does and accepts, as sentences.
 std::string sentences(const OptionHelp& option) {
   std::string text = option.text;
   if (!option.choices.empty())
-    text += ". One of: " + joined(option.choices);
+    text += explains_choices(option) ? "" : ". One of: " + joined(option.choices);
   else if (!option.constraint.empty())
     text += ". Must be " + option.constraint;
   if (option.is_required) text += ". Required";
@@ -62,22 +71,39 @@ std::string code(const std::string& text) {
   return text.empty() ? "" : "`" + text + "`";
 }
 
-void add_markdown(const CommandHelp& command, const std::string& heading, std::string& page) {
+/// A row of a table of options.
+std::string markdown_row(const OptionHelp& option) {
+  std::vector<std::string> names;
+  for (const std::string& name : option.names) names.push_back(code(name));
+  return "| " + joined(names) + " | " + code(value_text(option)) + " | " +
+         code(option.default_text) + " | " + cell(sentences(option)) + " |\n";
+}
+
+/// Of rows that an earlier command's table has (`shown`), only the options' names are written.
+void add_markdown(const CommandHelp& command,
+                  const std::string& heading,
+                  std::set<std::string>& shown,
+                  std::string& page) {
   const std::string mark = std::string(heading.find(' ') == std::string::npos ? "#" : "##");
   page += mark + " " + heading + "\n\n" + command.text + "\n";
   for (const auto& [group, options] : by_group(command)) {
-    page += "\n" + (group == "Options" ? std::string() : "**" + group + "**\n\n") +
-            "| Option | Value | Default | What it does |\n|---|---|---|---|\n";
+    std::string rows;
+    std::vector<std::string> above;
     for (const OptionHelp* option : options) {
-      std::vector<std::string> names;
-      for (const std::string& name : option->names) names.push_back(code(name));
-      page += "| " + joined(names) + " | " + code(value_text(*option)) + " | " +
-              code(option->default_text) + " | " + cell(sentences(*option)) + " |\n";
+      const std::string row = markdown_row(*option);
+      if (shown.insert(row).second)
+        rows += row;
+      else
+        above.push_back(code(option->long_name()));
     }
+    if (group != "Options") page += "\n**" + group + "**\n";
+    if (!rows.empty())
+      page += "\n| Option | Value | Default | What it does |\n|---|---|---|---|\n" + rows;
+    if (!above.empty()) page += "\nAs above: " + joined(above) + ".\n";
   }
   for (const CommandHelp& part : command.commands) {
     page += "\n";
-    add_markdown(part, heading + " " + part.name, page);
+    add_markdown(part, heading + " " + part.name, shown, page);
   }
 }
 
@@ -145,7 +171,8 @@ found nothing, 75 stopped with progress saved.
 
 std::string markdown_page(const CommandHelp& program) {
   std::string page;
-  add_markdown(program, program.name, page);
+  std::set<std::string> shown;
+  add_markdown(program, program.name, shown, page);
   return page;
 }
 

@@ -7,7 +7,8 @@
 
 namespace af::cli {
 
-/// A page of the reference: headings and a table of options per group.
+/// A page of the reference: headings and a table of options per group. A row that several commands
+/// share is in the table of the first; the others name its option.
 std::string markdown_page(const CommandHelp& program);
 
 /// A page for man(1), section 1. `version` goes into its foot.

@@ -13,9 +13,8 @@ void bind_run_limits(CLI::App& app) {
 }
 
 void ResumeOptions::describe(Fields& field) {
-  field("restart",
-        restarts,
-        "Discard what a stopped or killed run has finished (OUTPUT.progress), and start over")
+  field(
+      "restart", restarts, "Discard the progress of a stopped run (OUTPUT.progress) and start over")
       .not_recorded("results are the same");
 }
 

@@ -67,11 +67,9 @@ void AttenuationModel::describe(Fields& field) {
         "Attenuation of water, 1/mm: mu = this * max(0, 1 + HU/1000)")
       .above(0.0)
       .at_most(1.0);
-  field(
-      "air_below_hu",
-      air_below_hu,
-      "Voxels below this HU count as air. Noise below the cut is lost and noise above it counts: a "
-      "higher cut lowers the bias of a noisy CT's air, but also removes lung tissue")
+  field("air_below_hu",
+        air_below_hu,
+        "Voxels below this HU count as air: a higher cut removes more noise, but also lung")
       .within(-1000, 0);
 }
 

@@ -21,15 +21,11 @@ std::optional<std::pair<double, double>> label_of(const std::string& text) {
 
 void CtReadOptions::describe(Fields& field) {
   field("series", series_uid, "DICOM series UID, when the CT's folder has several").input();
-  field("resample",
-        resamples,
-        "Resample a CT of a tilted gantry or of uneven slices to an upright, even grid; without "
-        "it such a CT is refused");
+  field("resample", resamples, "Accept a CT of a tilted gantry or of uneven slices, by resampling");
   field("values",
         values,
-        "What the CT's voxels hold: hu; mu: attenuation per mm; raw: numbers with mu = "
-        "--raw-slope-per-mm * number + --raw-offset-per-mm; labels: numbers of tissues, see "
-        "--label-hu")
+        "What voxels hold: hu; mu: attenuation per mm; raw: numbers that --raw-slope-per-mm and "
+        "--raw-offset-per-mm scale; labels: see --label-hu")
       .choice({"hu", "mu", "raw", "labels"});
   field("raw_slope_per_mm", raw_slope_per_mm, "With --values raw: attenuation per unit, 1/mm")
       .finite();
@@ -37,8 +33,7 @@ void CtReadOptions::describe(Fields& field) {
       .finite();
   field("values_water_mu_per_mm",
         values_water_mu_per_mm,
-        "With --values mu or raw: the attenuation that becomes 0 HU, 1/mm; with the same value of "
-        "--water-mu-per-mm, line integrals are those of the file's attenuation")
+        "With --values mu or raw: the attenuation that becomes 0 HU, 1/mm")
       .above(0.0)
       .at_most(1.0);
   field("label_hu",

@@ -51,12 +51,11 @@ constexpr std::array kLookUps = {
     KnownLookUp{
         "nearest", "nearest node", nullptr, make_literal<FieldInterpolation::Nearest>, nullptr},
     two_pass<TwoPassOptions{Linear, Linear}>("linear", "linear, in two passes"),
-    two_pass<TwoPassOptions{Linear, Linear, true}>(
-        "cubic-sum", "linear, but several slabs are summed on a quarter more nodes"),
+    two_pass<TwoPassOptions{Linear, Linear, true}>("cubic-sum", "linear, on a quarter more nodes"),
     two_pass<TwoPassOptions{Cubic, Linear}>("cubic", "cubic over (s,t)", "cubic-sum"),
     two_pass<TwoPassOptions{Cubic, Cubic}>("cubic-uv", "cubic over (s,t) and (u,v)"),
     KnownLookUp{"quadrilinear",
-                "over each ray's 16 nodes, the definition",
+                "16 nodes of each ray, slow",
                 nullptr,
                 make_literal<FieldInterpolation::Quadrilinear>,
                 nullptr},

@@ -12,14 +12,11 @@ namespace af {
 void XrayBeamOptions::describe(Fields& field) {
   field.part(spectrum);
   field.at("tube_kvp").help =
-      "Make DRRs for the spectrum of a tube of this voltage, kV, through water and bone "
-      "(docs/spectra.md); fields then need FIELD.bone.af.h5, the field of the bone. 0: one energy, "
-      "the "
-      "HU scale's effective one";
+      "DRRs for the spectrum of a tube of this voltage, kV (docs/spectra.md); fields then need "
+      "FIELD.bone.af.h5; 0: one energy";
   field("scatter_to_primary",
         scatter_to_primary,
-        "Make DRRs with even scatter: this many times the mean primary signal of the rendered "
-        "region is added to every pixel (docs/spectra.md)")
+        "Even scatter in DRRs, as a multiple of the mean primary signal (docs/spectra.md)")
       .within(0.0, 100.0);
 }
 

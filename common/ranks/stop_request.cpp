@@ -44,16 +44,15 @@ void RunLimits::describe(Fields& field) {
   const char* const why = "results are the same";
   field("max_hours",
         max_hours,
-        "Stop this many hours after the start, as on SIGUSR1: finished work is saved, the "
-        "exit code is 75, and the same command continues from there [no limit]")
+        "Stop after this many hours with exit code 75; the same command then continues [no limit]")
       .above(0.0)
       .checked_when_typed()
       .default_in_help()
       .not_recorded(why);
   field("stall_minutes",
         stall_minutes,
-        "End the job, with exit code 75, when a rank makes no progress for this many minutes; must "
-        "be longer than any unit of work takes; 0: never")
+        "End the job, with exit code 75, when a rank makes no progress for this many minutes; 0: "
+        "never")
       .at_least(0.0)
       .checked_when_typed()
       .not_recorded(why);

@@ -430,16 +430,12 @@ void write_together(const std::vector<TargetResult>& results, const std::filesys
 void ImageQualityOptions::describe(Fields& field_list) {
   field_list("field", field, "Field file of one camera").input();
   field_list("ct", ct, "The CT the field was made from: image file or DICOM folder").input();
-  field_list("study",
-             study,
-             "Instead of both: study.toml whose views name their fields (key `field`); one box "
-             "plot of all, the worst pairs side by side")
-      .input();
+  field_list("study", study, "Instead of both: study.toml whose views name their fields").input();
   field_list("case", cases, "Case of the study, may be repeated (default: all)");
   field_list("rig",
              rig,
-             "With --camera: look through another camera than the field's, whose rays it has to "
-             "hold; random poses are then drawn where it does [the field's own camera]")
+             "With --camera: look through another camera, whose rays the field holds [the field's "
+             "own camera]")
       .excludes({"--study"})
       .needs({"--camera"})
       .input();
@@ -456,8 +452,8 @@ void ImageQualityOptions::describe(Fields& field_list) {
       .choice(field_look_up_names());
   field_list("split_loss_poses",
              split_loss_poses,
-             "Split the loss at so many of the poses into interpolation over (u,v), over (s,t), "
-             "and quantisation; some ten ray-cast DRRs each")
+             "Split the loss at so many poses into interpolation and quantisation; some ten "
+             "ray-cast DRRs each")
       .at_least(0);
   field_list.part(ray_caster);
   field_list.part(beam);
@@ -514,12 +510,11 @@ void run_image_quality(const ImageQualityOptions& options,
 }  // namespace
 
 cli::SubCommand image_quality_command(CLI::App& app) {
-  cli::SubCommand command = cli::sub_command(
-      app,
-      "image-quality",
-      "DRRs of a field against ray casting at random poses of its motion range (the paper's Fig. "
-      "8): PSNR, statistics, box plot, worst pair",
-      run_image_quality);
+  cli::SubCommand command = cli::sub_command(app,
+                                             "image-quality",
+                                             "DRRs of a field against ray casting at random poses "
+                                             "of its range: PSNR, box plot, worst pair",
+                                             run_image_quality);
   cli::bind_run_limits(*command.app);
   return command;
 }

@@ -184,7 +184,7 @@ void HeldOutOptions::describe(Fields& field_list) {
   field_list.part(ct_reading);
   field_list.part(ray_caster);
   field_list(
-      "look_up", look_up, "How DRRs are looked up [each field's own way]. " + field_look_up_help())
+      "look_up", look_up, "How DRRs are looked up [the field's own way]. " + field_look_up_help())
       .choice(field_look_up_names());
   field_list("threads", threads, "Threads; 0: every processor").within(0, 1024);
   field_list("output",
@@ -245,8 +245,7 @@ cli::SubCommand held_out_command(CLI::App& app) {
   return cli::sub_command(
       app,
       "held-out",
-      "How well fields, and ray casting through their CT, predict X-rays whose true pose is known: "
-      "PSNR with the X-ray as the reference, per view and as a table",
+      "How well fields and ray casting predict X-rays of known pose: PSNR, per view and as a table",
       run_held_out);
 }
 

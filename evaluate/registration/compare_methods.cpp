@@ -22,15 +22,12 @@ void CompareOptions::describe(Fields& field) {
   field("screen", is_screen, "In Markdown, measures against optimisers instead of a row per run");
   field("pose_distances",
         with_pose_distances,
-        "Also the distance between the end poses of every two methods from the same starts (mean "
-        "over the target box: median, 95th percentile, maximum) and the rotation between them for "
-        "every patient, and the mean distance over patients with intervals, as further tables and "
-        "as CSVs, ...-pose-distances.csv and ...-pose-distances-over-patients.csv. Runs of "
-        "different X-rays are refused");
+        "Also tables of how far the ends of every two methods from the same starts lie apart, per "
+        "patient and over patients");
   field("equivalence_margin_mm",
         equivalence_margin_mm,
-        "With --pose-distances: two methods count as equivalent when their ends lie closer "
-        "together than this on average over patients, mm")
+        "With --pose-distances: methods are equivalent when their ends are this near on average "
+        "over patients, mm")
       .above(0.0)
       .finite();
 }
@@ -77,12 +74,11 @@ void run_compare(const CompareOptions& options,
 }  // namespace
 
 cli::SubCommand compare_command(CLI::App& app) {
-  return cli::sub_command(
-      app,
-      "compare",
-      "One table of finished registration runs: success for starts 0-8, 8-16 and 16-30 mm from "
-      "gold, TRE, bias, DRRs and seconds, and field against ray casting, as Markdown and CSV",
-      run_compare);
+  return cli::sub_command(app,
+                          "compare",
+                          "One table of finished registration runs: success by distance of the "
+                          "start, TRE, bias, DRRs and seconds, as Markdown and CSV",
+                          run_compare);
 }
 
 }  // namespace af::evaluation

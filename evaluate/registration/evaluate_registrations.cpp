@@ -361,19 +361,16 @@ void describe_starts(Fields& field, RegistrationStudyOptions& options) {
       "starts_per_interval", options.starts_per_interval, "Starts in each interval of initial TRE");
   field("intervals", options.intervals, "Number of intervals of initial TRE, from 0 mm");
   field("interval_width_mm", options.interval_width_mm, "Width of an interval, mm");
-  field(
-      "start_rule",
-      options.start_rule,
-      "stratified: as many starts in each interval, draws outside the fields' motion range drawn "
-      "again (the paper); uniform: as many in all, their initial TREs uniform over all "
-      "intervals; within-range: as many in each interval, inside the motion range by design: where "
-      "the range holds a parameter back, the others make up for it")
+  field("start_rule",
+        options.start_rule,
+        "Where starts are drawn: stratified, equally many per interval, as in the paper; uniform "
+        "over all intervals; or within-range, equally many per interval inside the fields' motion "
+        "range")
       .choice({"stratified", "uniform", "within-range"});
   field("starts_from",
         options.starts_from,
-        "starts.csv of another run instead of drawn starts: [case,] and m00 ... m23 of "
-        "room_from_ct, or start_rx_deg ... start_tz_mm relative to gold. The column case may be "
-        "missing where one case is registered")
+        "starts.csv instead of drawn starts: case, and m00 ... m23 of room_from_ct or start_rx_deg "
+        "... start_tz_mm relative to gold")
       .input();
   field("starts_only",
         options.is_starts_only,
@@ -382,18 +379,15 @@ void describe_starts(Fields& field, RegistrationStudyOptions& options) {
   field.part(options.pictures);
   field("only_start",
         options.only_start,
-        "Register from this start alone, its start_index in starts.csv, by every renderer: repeats "
-        "one row of a run")
+        "Register from this start_index of starts.csv alone, to repeat one row of a run")
       .at_least(0);
 }
 
 void describe_methods(Fields& field, RegistrationStudyOptions& options) {
   field("poses_from",
         options.poses_from,
-        "Evaluate the poses that another program found from --starts-from, without registering: "
-        "CSV of start_index, [case, seconds] and m00 ... m23 of room_from_ct, or rx_deg ... tz_mm "
-        "relative to the nominal pose, or final_rx_deg ... relative to gold; or a folder of "
-        "[CASE-]INDEX.tfm");
+        "Evaluate poses that another program found from --starts-from: CSV of start_index, [case, "
+        "seconds] and a pose (docs/poses.md), or a folder of [CASE-]INDEX.tfm");
   field("method_name", options.method_name, "With --poses-from: what to call them")
       .of_form("letters, digits, blanks and . _ + - only", [](const std::string& name) {
         return !name.empty() && name.find_first_not_of(
@@ -409,8 +403,8 @@ void describe_methods(Fields& field, RegistrationStudyOptions& options) {
         "With --renderer both: ray casting only in the first so many intervals (default: all)");
   field("equivalence_margin_mm",
         options.equivalence_margin_mm,
-        "Field and ray casting count as equivalent when their end poses lie closer together than "
-        "this on average over patients, mm")
+        "Field and ray casting are equivalent when their ends are this near on average over "
+        "patients, mm")
       .above(0.0)
       .finite()
       .not_deciding("rows do not depend on it");
@@ -530,13 +524,12 @@ void run_registration(const RegistrationStudyOptions& options,
 cli::SubCommand registration_command(CLI::App& app, const std::string& program) {
   auto options = std::make_shared<RegistrationStudyOptions>();
   options->program = program;
-  cli::SubCommand command = cli::sub_command(
-      app,
-      "registration",
-      "Registers the cases of a study from starts at stated distances from the gold pose and "
-      "reports TRE and success (the paper's Table II, Figs. 15 and 16)",
-      run_registration,
-      options);
+  cli::SubCommand command = cli::sub_command(app,
+                                             "registration",
+                                             "Registers a study's cases from starts at stated "
+                                             "distances from the gold pose, for TRE and success",
+                                             run_registration,
+                                             options);
   cli::bind_run_limits(*command.app);
   command.app->parse_complete_callback([options, app = command.app] {
     options->shared_by_repeats = cli::given_options(*app, not_of_repeats);

@@ -25,8 +25,8 @@ void JoinStudiesOptions::describe(Fields& field) {
   field("studies", studies, "study.toml files").as("STUDY").required();
   field("fields",
         fields,
-        "Name every view's field: a path, relative to the new study, with {case} and {camera}, "
-        "such as fields/{case}-{camera}.af.h5 (default: as the studies do)");
+        "Path of every view's field, relative to the new study, such as "
+        "fields/{case}-{camera}.af.h5 (default: as the studies do)");
   field("output", output, "The study to write").as("-o,--output");
 }
 
@@ -81,8 +81,7 @@ cli::SubCommand join_studies_command(CLI::App& app) {
   return cli::sub_command(
       app,
       "join-studies",
-      "One study.toml of the cases of several, which must have the same cameras: a study of many "
-      "patients, for `registration`, `image-quality` and `field-parameters`",
+      "One study.toml of the cases of several, which must have the same cameras",
       run_join_studies);
 }
 

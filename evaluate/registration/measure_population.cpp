@@ -35,9 +35,8 @@ void write_population(const PopulationOptions& options,
 void PopulationOptions::describe(Fields& field) {
   field("condition",
         conditions,
-        "NAME=FOLDER: finished registration runs of one condition, of any number of patients, "
-        "searched with all below the folder. NAME is VARIANT-VIEWS-PRESET for the figures. May be "
-        "repeated")
+        "VARIANT-VIEWS-PRESET=FOLDER: finished registration runs of one condition, in and below "
+        "the folder; may be repeated")
       .required()
       .one_at_a_time();
   field("seed", seed, "Seed of the bootstrap");
@@ -59,13 +58,11 @@ void run_population(const PopulationOptions& options,
 }  // namespace
 
 cli::SubCommand population_command(CLI::App& app) {
-  return cli::sub_command(
-      app,
-      "population",
-      "Success and capture range of many patients, with intervals over patients (bootstrap and "
-      "Student's), for all, for those of odd and of even numbers, and for every kind. A case "
-      "named PATIENT-pN is a true pose of that patient",
-      run_population);
+  return cli::sub_command(app,
+                          "population",
+                          "Success and capture range of many patients, with intervals over "
+                          "patients; a case named PATIENT-pN is a pose of that patient",
+                          run_population);
 }
 
 }  // namespace af::evaluation

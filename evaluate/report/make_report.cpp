@@ -33,14 +33,11 @@ void run_report(const ReportOptions& options,
 }  // namespace
 
 cli::SubCommand report_command(CLI::App& app) {
-  return cli::sub_command(
-      app,
-      "report",
-      "One self-contained HTML page of finished runs, side by side when there are several: "
-      "findings "
-      "in plain words, figures, tables that sort, overlays, failures with their searches and the "
-      "commands that repeat them, provenance; opens offline, prints well. Starts af-report",
-      run_report);
+  return cli::sub_command(app,
+                          "report",
+                          "One HTML page of finished runs: findings, figures, tables, failures and "
+                          "the commands that repeat them. Starts af-report",
+                          run_report);
 }
 
 }  // namespace af::evaluation

@@ -14,9 +14,8 @@ int main(int argc, char** argv) {
   using namespace af;
   tools::ScanOptions options;
   CLI::App app{
-      "Makes a registration study of real X-rays from a circular cone-beam scan: finds the true "
-      "geometry from the even views, reconstructs a CT from them, and takes odd views as X-rays. "
-      "The true pose of every X-ray is the identity; the odd views show how accurate that is."};
+      "Makes a registration study of real X-rays from a circular cone-beam scan: the even views "
+      "give geometry and CT, odd views are the X-rays, whose true pose is the identity."};
   cli::bind_options(app, options);
   const std::string command_line = cli::command_line(argc, argv);
   return cli::app_main(app, argc, argv, [&](const Communicator& world) {

@@ -12,10 +12,7 @@ void ScanOptions::describe(Fields& field) {
       .input()
       .required();
   field("folder", folder, "Where the scan's images are; default: beside the scan's file");
-  field("output",
-        output,
-        "Study folder to make: study.toml, rig.toml, ct.nii.gz, calibration.toml, held-out.csv, "
-        "X-rays, masks, pictures, provenance.json, reproduce.sh. Appears when complete")
+  field("output", output, "Study folder to make; appears when complete")
       .as("-o,--output")
       .required();
   field("force", replaces_output, "Replace the folder if it exists");
@@ -23,20 +20,16 @@ void ScanOptions::describe(Fields& field) {
       .within(64, 4096);
   field("enlarge_small",
         enlarges_small,
-        "Multiply all lengths of a small scan by a whole number, until the detector sees 60 mm "
-        "across "
-        "at the axis and the source is 200 mm from it: registrations begin tens of mm away. "
-        "Lengths of "
-        "the study, and errors, are then enlarged ones; calibration.toml has the number");
+        "Multiply a small scan's lengths, and so errors, by a whole number, which calibration.toml "
+        "states, until the detector sees 60 mm");
   field("pairs",
         pairs,
-        "Pairs of X-rays about 90 degrees apart, evenly around the circle; the first X-ray of each "
-        "is a case of one view, too")
+        "Pairs of X-rays about 90 degrees apart; the first of each is a case of one view, too")
       .within(1, 1000);
   field("max_offset_rotation_deg",
         max_offset_rotation_deg,
-        "A case's nominal pose is turned from the true one by a uniform draw of at most this about "
-        "each axis, degrees")
+        "Nominal poses are turned from the true one by a uniform draw of at most this about each "
+        "axis, degrees")
       .within(0.0, 30.0);
   field("max_offset_translation_mm",
         max_offset_translation_mm,
@@ -44,15 +37,13 @@ void ScanOptions::describe(Fields& field) {
       .within(0.0, 100.0);
   field("mask_deviations",
         mask_deviations,
-        "Places where an X-ray differs from its prediction by more than so many times what is "
-        "expected there (its robust standard deviation, and a tenth of the predicted detail) are "
-        "masked: something moved during the scan; 0: no masks")
+        "Mask places where an X-ray differs from its prediction by more than so many standard "
+        "deviations; 0: no masks")
       .within(0.0, 1000.0);
   field("write_projections",
         writes_projections,
-        "Write every view, too: projections.toml is a study whose case 'measured' has the even "
-        "views, for af-precompute --projections, and 'held-out' the odd ones, for af-evaluate "
-        "held-out");
+        "Write every view, too: projections.toml has the cases 'measured', for af-precompute "
+        "--projections, and 'held-out', for af-evaluate held-out");
   field("seed", seed, "Seed of the nominal poses");
   field("threads", threads, "Threads; 0: every processor")
       .within(0, 1024)

@@ -243,8 +243,7 @@ AngleBasis SelfCalibrationOptions::basis_for(const CircularScan& scan,
 void SelfCalibrationOptions::describe(Fields& field) {
   field("harmonics",
         harmonics,
-        "Harmonics of the view angle in which the beam's foot and the detector's rotation may "
-        "change; at most one per 16 views")
+        "Harmonics of the view angle in which the detector may move; at most one per 16 views")
       .within(0, 12);
   field("rounds", rounds, "Rounds of reconstructing, predicting and moving cameras").within(1, 100);
   field.leave_out(coarse_px, "one value suits every scan");
@@ -256,9 +255,8 @@ void SelfCalibrationOptions::describe(Fields& field) {
       .within(32, 4096);
   field("focal_share",
         focal_share,
-        "The detector's distance is sought within this share of the stated one; 0: kept. "
-        "Projections hardly determine it, and all lengths of the CT scale with it. Default: the "
-        "scan's distance_tolerance")
+        "The detector's distance, which scales all lengths, is sought within this share of the "
+        "stated one; 0: kept. Default: the scan's distance_tolerance")
       .within(0.0, 0.3);
   field("tilt_deg", tilt_deg, "The detector's tilt is sought within so many degrees; 0: kept")
       .within(0.0, 10.0);

@@ -13,10 +13,8 @@
 int main(int argc, char** argv) {
   af::tools::SimulateOptions options;
   CLI::App app{
-      "Makes a registration study with a known answer: X-rays of a CT or phantom by an exact "
-      "polyenergetic projector with scatter, noise, blur and grey levels, steel fiducials and "
-      "their detections, regions of interest, and the true pose. With --cone-beam a circular scan "
-      "for af-scan instead."};
+      "Makes a registration study with a known answer: realistic X-rays of a CT or phantom, "
+      "fiducials and the true pose. With --cone-beam a circular scan for af-scan instead."};
   af::cli::bind_options(app, options);
   const std::string command_line = af::cli::command_line(argc, argv);
   return af::cli::app_main(app, argc, argv, [&](const af::Communicator& world) {

@@ -159,15 +159,12 @@ void PhantomOptions::describe(Fields& field) {
   field.leave_out(threads, "voxels do not depend on it");
   field("metal",
         has_metal,
-        "Phantoms only: with pedicle screws and rods (spine), a hip prosthesis (pelvis) or "
-        "fillings and a plate (head). The X-rays show metal as dense as it is, the CT clips it at "
-        "3071 HU as scanners do");
+        "Phantoms only: with screws and rods (spine), a hip prosthesis (pelvis), or fillings and a "
+        "plate (head), which the CT clips at 3071 HU");
   field("anatomy_seed",
         anatomy_seed,
-        "Phantoms only: which patient. Every number is another one: size, proportions, shapes, "
-        "bone density, arthrosis, scoliosis, gas, calcifications, implants. Voxels are then the "
-        "CT's alone; X-rays are line integrals of the bodies themselves. Default: the typical "
-        "adult, X-rays of the voxels")
+        "Phantoms only: every number is another patient, whose X-rays are line integrals of the "
+        "bodies themselves. Default: the typical adult, X-rays of the voxels")
       .at_least(0);
 }
 

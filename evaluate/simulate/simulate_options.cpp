@@ -30,17 +30,13 @@ void describe_patient(Fields& field, SimulateOptions& o) {
 }
 
 void describe_output(Fields& field, SimulateOptions& o) {
-  field("output",
-        o.output,
-        "Study folder to make: study.toml, rig.toml, truth.toml, one X-ray per camera, previews, "
-        "provenance.json, reproduce.sh. Appears when complete")
+  field("output", o.output, "Study folder to make; appears when complete")
       .as("-o,--output")
       .required();
   field("force", o.replaces_output, "Replace the folder if it exists");
   field("copy_ct",
         o.copies_ct,
-        "Write the CT into the study as ct.nii.gz; otherwise a --ct is referred to by its absolute "
-        "path (a phantom is always written)");
+        "Write the CT into the study as ct.nii.gz, as a phantom always is, instead of its path");
   field("xray_format",
         o.xray_format,
         "Format of the X-rays: mha; dicom: XA, MONOCHROME1, 8 to 16 bits, with the positioner's "
@@ -57,9 +53,8 @@ void describe_target(Fields& field, SimulateOptions& o) {
   field.start_group("Target");
   field("center_ct_mm",
         o.center_ct_mm,
-        "ROI centre x,y,z in ct coordinates (LPS, mm), placed at the isocentre by the nominal "
-        "pose. Default: the middle vertebra of the phantom; of a CT, the bone-rich place nearest "
-        "its middle")
+        "ROI centre x,y,z (LPS, mm), which the nominal pose puts at the isocentre. Default: the "
+        "phantom's middle vertebra, or the bone-rich place nearest the CT's middle")
       .count(3)
       .comma_separated();
   field("target_box_ct_mm",
@@ -72,8 +67,8 @@ void describe_target(Fields& field, SimulateOptions& o) {
         "Phantoms only: the target is this bone, one of those that --moved-bone takes");
   field("roi_px",
         o.roi_px,
-        "Width,height of the region of interest on each detector, centred on the projected target. "
-        "Default: 200,200 (at most 60 % of the detector), more if the projected box needs it")
+        "Width,height of the region of interest about the projected target. Default: 200,200, at "
+        "most 60 % of the detector, or more for the target box")
       .at_least(16)
       .count(2)
       .comma_separated();
@@ -92,10 +87,8 @@ void describe_truth(Fields& field, SimulateOptions& o) {
       .within(0.0, 1000.0);
   field("moved_bone",
         o.moved_bone,
-        "Phantoms only: the X-rays, which are then of the bodies themselves, show this bone turned "
-        "by 2 to 5 degrees and moved by 2 to 6 mm against the rest, as --seed has it; the CT does "
-        "not. The bone is then the target, the true pose is its own, and the draws above are of "
-        "the rest. " +
+        "Phantoms only: X-rays show this bone, the target, turned by 2 to 5 degrees and moved by 2 "
+        "to 6 mm against the rest; the true pose is the bone's. " +
             bone_help());
   field("no_fiducials", o.omits_fiducials, "No steel pins (four of 2 x 6 mm otherwise)");
 }
@@ -204,13 +197,10 @@ Phantom phantom_of(const SimulateOptions& options) {
 }
 
 void ConeBeamOptions::describe(Fields& field) {
-  field(
-      "cone_beam",
-      views,
-      "Take this many X-rays on a circle about the CT's centre, by the rig's first camera, and "
-      "write a scan for af-scan: "
-      "scan.toml, an X-ray per view, and ct.nii.gz; X-rays of a phantom show its exact shapes, not "
-      "voxels. 0: a study")
+  field("cone_beam",
+        views,
+        "Write a scan for af-scan: this many X-rays on a circle about the CT's centre, by the "
+        "rig's first camera; 0: a study")
       .within(0, 100000);
   field(
       "elevations_deg",
@@ -230,10 +220,8 @@ void SimulateOptions::describe(Fields& field) {
   describe_target(field, *this);
   describe_truth(field, *this);
   field.start_group("Imaging (0 switches an effect off)");
-  field("ideal",
-        is_ideal,
-        "All effects off: one energy, no scatter, noise, blur or quantisation; float pixels. Use "
-        "with --no-fiducials for pure line integrals");
+  field(
+      "ideal", is_ideal, "All effects off, float pixels; with --no-fiducials pure line integrals");
   field.start_group("");
   field.part(xray);
   field.start_group("Stress (what real X-rays have)");

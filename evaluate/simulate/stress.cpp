@@ -124,10 +124,8 @@ DetectorOptions StressOptions::detector(DetectorOptions detector) const {
 void StressOptions::describe(Fields& field) {
   field("stress",
         names,
-        "Comma separated: rods, fiducials (steel in the X-rays, not in the CT), heel (ramp over "
-        "the detector), scatter (heavy, from the open beam too), noise, degraded-ct (the study's "
-        "CT; X-rays show the good one), calibration (the study's rig is slightly wrong), motion "
-        "(non-rigid, away from the target); or all")
+        "What to add, comma separated: steel rods or fiducials, heel effect, heavy scatter, noise, "
+        "a degraded CT, a slightly wrong calibration, non-rigid motion; or all")
       .comma_separated()
       .one_of(stress_names())
       .choice(stress_names());

@@ -303,13 +303,12 @@ cli::SubCommand similarity_curves_command(CLI::App& app) {
   auto options = std::make_shared<SimilarityCurvesOptions>();
   options->renderer = "both";
   options->method.preset = "paper";
-  cli::SubCommand command = cli::sub_command(
-      app,
-      "similarity-curves",
-      "Similarity along each of the six pose parameters about the gold pose, by field and by ray "
-      "casting (the paper's Fig. 14): where the maxima lie and which axis is broadest",
-      run_similarity_curves,
-      options);
+  cli::SubCommand command = cli::sub_command(app,
+                                             "similarity-curves",
+                                             "Similarity along each of the six pose parameters "
+                                             "about the gold pose, by field and by ray casting",
+                                             run_similarity_curves,
+                                             options);
   cli::bind_run_limits(*command.app);
   return command;
 }

@@ -165,14 +165,11 @@ void run_error_budget(const ErrorBudgetOptions& options,
 }  // namespace
 
 cli::SubCommand error_budget_command(CLI::App& app) {
-  return cli::sub_command(
-      app,
-      "error-budget",
-      "What each part of the chain from CT to pose adds to the error: finished registration runs "
-      "of "
-      "one case from the same starts, each different from the one before in one thing "
-      "(jobs/error-budget.sh makes them)",
-      run_error_budget);
+  return cli::sub_command(app,
+                          "error-budget",
+                          "What each part of the chain from CT to pose adds to the error, by runs "
+                          "that differ in one thing (jobs/error-budget.sh)",
+                          run_error_budget);
 }
 
 }  // namespace af::evaluation

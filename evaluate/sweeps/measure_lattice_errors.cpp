@@ -219,13 +219,11 @@ void run_lattice_errors(const LatticeErrorsOptions& options,
 }  // namespace
 
 cli::SubCommand lattice_errors_command(CLI::App& app) {
-  return cli::sub_command(
-      app,
-      "lattice-errors",
-      "Whether registrations lean towards the nodes of the fields: X-rays by ray casting at true "
-      "poses that step through a cell, each registered from 1 mm beside it; the error's dependence "
-      "on the fraction of a cell, and with --renderer both the same by ray casting",
-      run_lattice_errors);
+  return cli::sub_command(app,
+                          "lattice-errors",
+                          "Whether registrations lean towards the nodes of the fields, at true "
+                          "poses that step through a cell",
+                          run_lattice_errors);
 }
 
 }  // namespace af::evaluation

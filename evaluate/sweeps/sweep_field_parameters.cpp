@@ -352,13 +352,13 @@ cli::SubCommand field_parameters_command(CLI::App& app) {
   base.max_translation_mm = 30.0;
   base.preset = "paper";
   base.training_fraction = 0.1;  // the paper's
-  cli::SubCommand command = cli::sub_command(
-      app,
-      "field-parameters",
-      "PSNR of a camera's fields against each of the four field parameters, with memory, creation "
-      "time and compression (the paper's Fig. 10 and Table I); builds the fields that are missing",
-      run_field_parameters,
-      options);
+  cli::SubCommand command =
+      cli::sub_command(app,
+                       "field-parameters",
+                       "PSNR, memory, time and compression of a camera's fields against each of "
+                       "four parameters; builds missing fields",
+                       run_field_parameters,
+                       options);
   command.writes_by_mpi = true;  // fields
   cli::bind_run_limits(*command.app);
   return command;

@@ -67,23 +67,18 @@ void describe_casting(Fields& field, PrecomputeOptions& options) {
       .decides(kCastingStage);
   field("cover",
         options.cover,
-        "File of poses (docs/poses.md): the range is taken about each of them instead of the "
-        "nominal pose, and the field covers the smallest box of the six parameters that holds all "
-        "of these")
+        "File of poses (docs/poses.md): the field covers the range about each of them instead of "
+        "the nominal pose")
       .input();
   field("cover_rig",
         options.cover_rig,
         "Rig of further cameras: the field holds their rays, too, over the same range")
       .input();
-  field(
-      "orbit",
-      options.orbit,
-      "Make an atlas, one file of many fields, for the camera on an orbit: axis=z,from=-90,to=90 "
-      "turns it about the room's z through the isocentre, degrees, right-handed. Every pose of "
-      "the range at every angle is in one of its fields; they stand as far apart as the range "
-      "about the axis is wide, or step=10 degrees. About z, each field has the poses whose source "
-      "is nearest to its own; with members=by-pose, those whose angle is nearest, with all shifts, "
-      "in 1.4 times the bytes. A limit on size, PSNR or time applies to each field")
+  field("orbit",
+        options.orbit,
+        "Make an atlas, a file of many fields, for a camera that turns: "
+        "axis=z,from=-90,to=90[,step=10][,members=by-pose], degrees about the room's z through the "
+        "isocentre (docs/other-cameras.md)")
       .decides(kCastingStage);
   field("orbit_cameras",
         options.orbit_cameras,
@@ -103,9 +98,8 @@ void describe_casting(Fields& field, PrecomputeOptions& options) {
     field.at(name).not_deciding("the design that it chooses decides");
   field("slabs",
         options.slabs,
-        "Depth slabs K, each with its own (s,t) plane: with 8, some 8 --uv-nodes suffice; 1 is the "
-        "paper's field [that of the preset, or as chosen; 1 where parts of the design are "
-        "stated]")
+        "Depth slabs, each with its own (s,t) plane; the paper has 1, and with 8 some 8 --uv-nodes "
+        "suffice [the preset's, else 1]")
       .within(1, 64)
       .decides(kCastingStage);
   field("st_plane",
@@ -117,39 +111,33 @@ void describe_casting(Fields& field, PrecomputeOptions& options) {
   field(
       "uv_nodes",
       options.uv_nodes,
-      "Viewpoints along each side of the (u,v) plane, both edges included [that of the preset, or "
-      "as chosen; 64 where parts of the design are stated]")
+      "Viewpoints along each side of the (u,v) plane, both edges included [the preset's, else 64]")
       .within(2, kMostPlaneNodes)
       .decides(kCastingStage);
   field("st_nodes",
         options.st_nodes,
-        "Nodes along each side of the uncropped (s,t) plane, both edges included [that of the "
-        "preset, or as chosen; 256 where parts of the design are stated]")
+        "Nodes along each side of the uncropped (s,t) plane, both edges included [the preset's, "
+        "else 256]")
       .within(2, kMostPlaneNodes)
       .decides(kCastingStage);
   field("st_spacing_mm",
         options.st_spacing_mm,
-        "Instead of --st-nodes: nodes at most so far apart on every (s,t) plane, mm: those of the "
-        "preset, or as many more as that takes, in multiples of 32. Half the CT's voxel is as fine "
-        "as its DRRs are. Not with a probe")
+        "Instead of --st-nodes: largest distance of (s,t) nodes, mm; half the CT's voxel is as "
+        "fine as DRRs are")
       .above(0.0)
       .finite()
       .excludes({"--st-nodes", "--target-psnr-db", "--max-field-size", "--max-drr-ms"})
       .not_recorded("the nodes that follow from it are");
   field("uv_samples",
         options.uv_samples,
-        "What the field holds of a viewpoint: point (line integrals of its rays), or least-squares "
-        "(what makes linear interpolation between viewpoints come nearest to the line integrals of "
-        "all rays: some 1 dB for 3 to 4.5 times the rays cast; not with a probe) [that of the "
-        "preset; point where a probe chooses the design, or parts of it are stated without "
-        "--preset]")
+        "What a viewpoint holds: point, its line integrals; or least-squares, fitted for "
+        "interpolation, 1 dB better for 3 to 4.5 times the rays [the preset's, else point]")
       .one_of({"point", "least-squares"})
       .decides(kCastingStage);
   field("look_up",
         options.look_up,
-        "How DRRs are to be looked up in the field, unless a program is told otherwise; "
-        "registrations look several slabs up by cubic-sum instead of cubic [linear for "
-        "the paper's design, else cubic]")
+        "How programs look DRRs up unless told otherwise; registrations replace cubic by cubic-sum "
+        "[linear for the paper's design, else cubic]")
       .one_of({"linear", "cubic"})
       .not_deciding("samples and indices are the same");
   field("caster", options.caster, "How line integrals are made. " + caster_help())
@@ -160,33 +148,30 @@ void describe_casting(Fields& field, PrecomputeOptions& options) {
   step.help = "Trilinear caster: largest distance of samples along a ray, mm";
   field.part(options.attenuation);
   field.at("water_mu_per_mm").decides(kCastingStage);
-  field("material",
-        options.material,
-        "What of the CT the field holds: all, or bone alone, for DRRs of a tube's spectrum, which "
-        "programs look for in FIELD.bone.af.h5 beside FIELD.af.h5 (docs/spectra.md)")
+  field(
+      "material",
+      options.material,
+      "What of the CT the field holds: all, or bone alone, for a tube's spectrum (docs/spectra.md)")
       .one_of({"all", "bone"})
       .decides(kCastingStage);
   field("projections",
         options.projections,
-        "study.toml of X-rays that were measured around this CT, with their true pose: what they "
-        "hold beyond the CT is added to the field (docs/measured-fields.md); af-scan "
-        "--write-projections makes one")
+        "study.toml of X-rays of known pose: what they show beyond the CT is added to the field "
+        "(docs/measured-fields.md)")
       .input();
   field("projections_case", options.projections_case, "Case of --projections [the only one]")
       .needs({"--projections"})
       .input();
-  field("projections_smoothing_px",
-        options.projections_smoothing_px,
-        "Gaussian that smooths the projections' difference from the CT, standard "
-        "deviation in pixels: for noisy projections; 0: no smoothing")
+  field(
+      "projections_smoothing_px",
+      options.projections_smoothing_px,
+      "Gaussian on the projections' difference from the CT, standard deviation in pixels; 0: none")
       .within(0.0, 100.0)
       .not_deciding("the hash of the projections says it");
-  field(
-      "projections_common",
-      options.projections_common,
-      "What to do with the part of the projections' difference from the CT that is the same, at "
-      "a pixel, in all views: keep it, or remove it, because errors of the detector are like this "
-      "and differences of the object seldom are")
+  field("projections_common",
+        options.projections_common,
+        "Keep or remove what the projections' difference from the CT has at a pixel in all views, "
+        "as errors of a detector have")
       .one_of({"keep", "remove"})
       .not_deciding("the hash of the projections says it");
 }
@@ -196,19 +181,13 @@ std::uint64_t training_tiles_per_codeword(bool fits_uv) {
 }
 
 void describe_codebook(Fields& field, PrecomputeOptions& options) {
-  field("codewords",
-        options.codewords,
-        "Size of the codebook, 2 to 65536 [that of the preset, or as chosen; 16384 where parts of "
-        "the design are stated]")
-      .decides(kCodebookStage);
   field(
-      "tile_coding",
-      options.tile_coding,
-      "What a codeword is: plain (the tile), or mean-removed (what differs from the tile's mean, "
-      "which the field holds beside the index: with 4096 codewords 1 to 2 dB more than with 16384 "
-      "plain ones, in an eighth to a third more bytes). Files with means are read from format "
-      "version 3 on [the preset's; plain where a probe chooses the design, or parts of it are "
-      "stated]")
+      "codewords", options.codewords, "Size of the codebook, 2 to 65536 [the preset's, else 16384]")
+      .decides(kCodebookStage);
+  field("tile_coding",
+        options.tile_coding,
+        "What a codeword is: plain, the tile; or mean-removed, its difference from a mean kept "
+        "beside it, 1 to 2 dB better [the preset's, else plain]")
       .one_of({"plain", "mean-removed"})
       .decides(kCodebookStage);
   field("mean_step",
@@ -218,18 +197,14 @@ void describe_codebook(Fields& field, PrecomputeOptions& options) {
       .decides(kCodebookStage);
   field("tile_filter",
         options.tile_filter,
-        "Whether decoded tiles are corrected by what their neighbours say of them: none, or "
-        "neighbours (1 to 2 dB for two kilobytes; programs then hold all samples, 2 bytes each, "
-        "where they would look tiles up; read from format version 4 on; not with a probe) [that of "
-        "the preset; none where a probe chooses the design, or parts of it are stated without "
-        "--preset]")
+        "Correction of decoded tiles: none; or neighbours, by the tiles beside, 1 to 2 dB better, "
+        "but programs hold 2 bytes per sample [the preset's, else none]")
       .one_of({"none", "neighbours"})
       .not_deciding("samples and indices are the same");
   field("training_fraction",
         options.training_fraction,
-        "Share of the tiles that are not empty on which the codebook is trained; the paper's was "
-        "0.1 [64 tiles per codeword, 32 with least-squares viewpoints, at most a million, at most "
-        "8 of 9 tiles]")
+        "Share of the non-empty tiles that train the codebook; the paper's was 0.1 [64 or 32 tiles "
+        "per codeword, at most a million]")
       .recorded_when_unset(
           "training_tiles_per_codeword",
           std::to_string(training_tiles_per_codeword(options.uv_samples == "least-squares")))
@@ -251,17 +226,15 @@ void describe_run(Fields& field, PrecomputeOptions& options) {
       .not_deciding(why);
   field("memory_limit_bytes",
         options.memory_limit_bytes,
-        "Memory that each rank may take beside the CT and its grid, which every node holds once, "
-        "e.g. 8GB. Tiles that do not fit are read back from FIELD.h5.progress, or cast again where "
-        "that is measured to be faster [300 MiB]")
+        "Memory of each rank beside the CT, e.g. 8GB; tiles that do not fit are read back or cast "
+        "again [300 MiB]")
       .as("--memory-limit")
       .size()
       .default_in_help()
       .not_deciding(why);
   field("mpi_io_hints",
         options.mpi_io_hints,
-        "KEY=VALUE, once per hint to MPI-IO: cb_nodes, cb_buffer_size, striping_factor, ...; "
-        "precompute/README.md has which and when [MPI's own choice]")
+        "KEY=VALUE, once per hint to MPI-IO (precompute/README.md) [MPI's own choice]")
       .as("--mpi-io-hint")
       .one_at_a_time()
       .of_form("KEY=VALUE", is_key_and_value)

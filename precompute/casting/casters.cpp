@@ -33,7 +33,7 @@ constexpr std::array kCasters = {
                 kSmallUnits,
                 make_trilinear},
     KnownCaster{"shear-warp",
-                "the CT resampled once, then slice by slice; some 50 times faster",
+                "slice by slice, some 50 times faster",
                 true,
                 kShearWarpPlan,
                 kShearWarpPlan,

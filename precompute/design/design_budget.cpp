@@ -9,22 +9,18 @@ namespace af {
 void DesignBudget::describe(Fields& field) {
   field("target_psnr_db",
         target_psnr_db,
-        "Choose the design by a probe: the smallest file whose DRRs have this PSNR against ray "
-        "casting, the "
-        "median over poses of the range, dB")
+        "Choose the smallest design whose DRRs have this median PSNR against ray casting, dB")
       .within(10.0, 90.0);
   field("max_field_bytes",
         max_field_bytes,
-        "Choose the design by a probe: the best DRRs that a file of at most this size gives, e.g. "
-        "8MB")
+        "Choose the best design whose file is at most this large, e.g. 8MB")
       .as("--max-field-size")
       .size()
       .at_least(1.0);
-  field("max_drr_ms",
-        max_drr_ms,
-        "Choose the design by a probe: at most so many milliseconds per DRR of the whole detector "
-        "on one "
-        "core, by an estimate")
+  field(
+      "max_drr_ms",
+      max_drr_ms,
+      "Choose a design that needs at most this time per DRR of the whole detector on one core, ms")
       .above(0.0)
       .finite();
 }

@@ -12,33 +12,26 @@ constexpr std::int64_t kMegabyte = 1000000;
 
 /// Every preset there is; a new one joins here.
 const std::array presets = {
-    DesignPreset{kPaperPreset,
-                 "one slab of 64 x 64 x 256 x 256 nodes, 16384 codewords, linear look-up",
-                 {1, 64, 256, 16384, "linear"},
-                 {}},
+    DesignPreset{
+        kPaperPreset, "one slab of 64 x 64 x 256 x 256 nodes", {1, 64, 256, 16384, "linear"}, {}},
     DesignPreset{"compact",
-                 "what a probe of the CT finds best within 4 MB",
+                 "the best within 4 MB by a probe of the CT",
                  {12, 8, 256, 16384, "cubic"},
                  {std::nullopt, 4 * kMegabyte, std::nullopt}},
     // For registration, depth slabs matter more than PSNR: with the one slab that a probe chose at
     // the same PSNR, registrations ended twice as far from ray casting's pose.
-    DesignPreset{
-        "standard",
-        "for registration: six slabs of 14 x 14 x 384 x 384 nodes, least-squares viewpoints, "
-        "mean-removed tiles, 4096 codewords, a tile filter, cubic look-up",
-        {6, 14, 384, 4096, "cubic", 96, true, true},
-        {}},
+    DesignPreset{"standard",
+                 "for registration, six slabs of 14 x 14 x 384 x 384 nodes",
+                 {6, 14, 384, 4096, "cubic", 96, true, true},
+                 {}},
     // One codebook serves every angle: with 4096 codewords the worst DRRs lost 1.7 dB
     // against those of an angle's own field (docs/other-cameras.md#what-an-atlas-costs).
-    DesignPreset{
-        kAtlasPreset,
-        "eight slabs of 12 x 12 x 384 x 384 nodes, mean-removed tiles, 16384 codewords for "
-        "all fields of an atlas",
-        {8, 12, 384, 16384, "cubic", 64},
-        {}},
+    DesignPreset{kAtlasPreset,
+                 "eight slabs of 12 x 12 x 384 x 384 nodes",
+                 {8, 12, 384, 16384, "cubic", 64},
+                 {}},
     DesignPreset{"fine",
-                 "what a probe of the CT finds best within 15 MB: the truest poses, in several "
-                 "times the time",
+                 "the best within 15 MB by a probe of the CT",
                  {12, 10, 512, 65536, "cubic"},
                  {std::nullopt, 15 * kMegabyte, std::nullopt}},
 };

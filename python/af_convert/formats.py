@@ -14,7 +14,6 @@ from .source import Source
 @dataclass(frozen=True)
 class Format:
     name: str
-    help: str
     is_this: Callable  # (source) -> bool
     read: Callable  # cameras: (source, options) -> StatedRig; poses: (source, context) -> [(number from 1, 4x4)], notes
     write: Callable = None  # cameras: (rig); poses: (poses, context) -> text or bytes
@@ -23,47 +22,30 @@ class Format:
 
 
 CAMERAS = (
-    Format("rig", "this project's rig.toml", rig_toml.is_rig_toml, rig_toml.read_rig_toml, rig_toml.write_rig_toml, False, True),
-    Format("mayacam2", "MayaCam 2 of XMALab and Autoscoper: image size, K, R, t", mayacam.is_mayacam2, mayacam.read_mayacam2,
-           mayacam.write_mayacam2),
-    Format("mayacam1", "MayaCam 1 of the XROMM scripts and Autoscoper: five lines of three numbers", mayacam.is_mayacam1,
-           mayacam.read_mayacam1, mayacam.write_mayacam1),
-    Format("opencv", "OpenCV FileStorage YAML: camera matrix, R or rvec, t", opencv.is_opencv, opencv.read_opencv,
-           opencv.write_opencv, True, True),
-    Format("rtk", "geometry XML of RTK (IEC 61217), one camera per projection", rtk.is_rtk, rtk.read_rtk, rtk.write_rtk, False),
-    Format("plastimatch", "projection file of plastimatch drr: matrix, SAD, SID, extrinsic, intrinsic", plastimatch.is_plastimatch,
-           plastimatch.read_plastimatch, plastimatch.write_plastimatch),
-    Format("plastimatch-command", "script with a plastimatch drr command: --nrm, --vup, --sad, --sid ...",
-           plastimatch.is_plastimatch_command, plastimatch.read_plastimatch_command),
-    Format("elastix", "transform parameters of elastix with the FocalPoint of its ray-casting interpolators", elastix.is_elastix,
-           elastix.read_elastix, elastix.write_elastix),
-    Format("xreg", "HDF5 of xReg: projection data, a camera, or proj-params of DeepFluoro", xreg.is_xreg, xreg.read_xreg,
-           xreg.write_xreg, False),
-    Format("rad", ".rad text beside a raw projection (xReg): source position, TPosition", rad.is_rad, rad.read_rad, rad.write_rad),
-    Format("diffdrr", "DiffDRR's sdd, height, width, delx, dely, x0, y0 and the camera's pose, as TOML", diffdrr.is_diffdrr_camera,
-           diffdrr.read_diffdrr_camera, diffdrr.write_diffdrr_camera, False),
-    Format("dicom", "header of a DICOM XA, RF, CR or DX image: distances, positioner angles, spacing",
-           dicom_camera.is_dicom_camera, dicom_camera.read_dicom_camera),
-    Format("matrix", "3x4 projection matrices as text, pixels from room mm", matrices.is_matrix_text, matrices.read_matrix_text,
-           matrices.write_matrix_text, False),
+    Format("rig", rig_toml.is_rig_toml, rig_toml.read_rig_toml, rig_toml.write_rig_toml, False, True),
+    Format("mayacam2", mayacam.is_mayacam2, mayacam.read_mayacam2, mayacam.write_mayacam2),
+    Format("mayacam1", mayacam.is_mayacam1, mayacam.read_mayacam1, mayacam.write_mayacam1),
+    Format("opencv", opencv.is_opencv, opencv.read_opencv, opencv.write_opencv, True, True),
+    Format("rtk", rtk.is_rtk, rtk.read_rtk, rtk.write_rtk, False),
+    Format("plastimatch", plastimatch.is_plastimatch, plastimatch.read_plastimatch, plastimatch.write_plastimatch),
+    Format("plastimatch-command", plastimatch.is_plastimatch_command, plastimatch.read_plastimatch_command),
+    Format("elastix", elastix.is_elastix, elastix.read_elastix, elastix.write_elastix),
+    Format("xreg", xreg.is_xreg, xreg.read_xreg, xreg.write_xreg, False),
+    Format("rad", rad.is_rad, rad.read_rad, rad.write_rad),
+    Format("diffdrr", diffdrr.is_diffdrr_camera, diffdrr.read_diffdrr_camera, diffdrr.write_diffdrr_camera, False),
+    Format("dicom", dicom_camera.is_dicom_camera, dicom_camera.read_dicom_camera),
+    Format("matrix", matrices.is_matrix_text, matrices.read_matrix_text, matrices.write_matrix_text, False),
 )
 POSES = (
-    Format("itk-hdf5", "ITK transform in HDF5 (xReg): ct_from_room, LPS, mm", itk.is_itk_hdf5, itk.read_itk_hdf5,
-           itk.write_itk_hdf5),
-    Format("dicom", "DICOM spatial registration: room_from_ct, LPS, mm", registration.is_registration,
-           registration.read_registration, registration.write_registration),
-    Format("itk", "ITK transform as text (.tfm, Slicer, elastix): ct_from_room, LPS, mm", itk.is_itk_text, itk.read_itk_text,
-           itk.write_itk_text),
-    Format("json", "result.json: room_from_ct", own_poses.is_json, own_poses.read_json),
-    Format("diffdrr", "DiffDRR's rotation and translation of one camera, RAS about the CT's middle", diffdrr.is_diffdrr_pose,
-           diffdrr.read_diffdrr_pose, diffdrr.write_diffdrr_pose, False),
-    Format("toml", "TOML: room_from_ct, 4x4", own_poses.is_toml, own_poses.read_toml, own_poses.write_toml),
-    Format("csv", "table of poses: m00 ... m23 of room_from_ct, or rx_deg ... tz_mm from nominal", own_poses.is_csv,
-           own_poses.read_csv, own_poses.write_csv, False),
-    Format("autoscoper", "Autoscoper .tra: a line of 16 numbers per frame, room from the CT's voxel frame",
-           autoscoper.is_autoscoper, autoscoper.read_autoscoper, autoscoper.write_autoscoper, False),
-    Format("matrix", "plain text: the 16 numbers of room_from_ct, row by row", own_poses.is_plain, own_poses.read_plain,
-           own_poses.write_plain),
+    Format("itk-hdf5", itk.is_itk_hdf5, itk.read_itk_hdf5, itk.write_itk_hdf5),
+    Format("dicom", registration.is_registration, registration.read_registration, registration.write_registration),
+    Format("itk", itk.is_itk_text, itk.read_itk_text, itk.write_itk_text),
+    Format("json", own_poses.is_json, own_poses.read_json),
+    Format("diffdrr", diffdrr.is_diffdrr_pose, diffdrr.read_diffdrr_pose, diffdrr.write_diffdrr_pose, False),
+    Format("toml", own_poses.is_toml, own_poses.read_toml, own_poses.write_toml),
+    Format("csv", own_poses.is_csv, own_poses.read_csv, own_poses.write_csv, False),
+    Format("autoscoper", autoscoper.is_autoscoper, autoscoper.read_autoscoper, autoscoper.write_autoscoper, False),
+    Format("matrix", own_poses.is_plain, own_poses.read_plain, own_poses.write_plain),
 )
 
 

@@ -38,20 +38,18 @@ def parser():
     result = argparse.ArgumentParser(
         prog="af-convert", allow_abbrev=False,
         description="Converts cameras, poses and studies of other programs to rig.toml, poses and study.toml, and back. A file's "
-        "content decides what it is. What a file holds beyond what is read of it is named in a warning, or refused.")
+        "content decides what it is.")
     # So that -10.5,20,30 is a value, with a blank before it, too.
     result._negative_number_matcher = re.compile("-[0-9.]")
     result.add_argument("files", nargs="+", metavar="FILE", help="camera files to make one rig of, each of any of the formats; or a "
                         "file of poses; or a study.toml, for its rig")
-    cameras = "; ".join(f"{one.name}: {one.help}" for one in formats.CAMERAS)
-    poses = "; ".join(f"{one.name}: {one.help}" for one in formats.POSES)
     names = list(dict.fromkeys(one.name for one in formats.CAMERAS + formats.POSES))
     targets = list(dict.fromkeys(formats.written(formats.CAMERAS) + formats.written(formats.POSES) + ["study"]))
     result.add_argument("--from", dest="source_format", choices=names, metavar="FORMAT",
-                        help=f"format of the files, when their content does not tell. Cameras: {cameras}. Poses: {poses}")
+                        help="format of the files (docs/cameras.md, docs/poses.md), when their content does not tell: " + ", ".join(names))
     result.add_argument("--to", dest="target_format", choices=targets, metavar="FORMAT",
-                        help="format to write; without it rig for cameras, and for poses what -o ends in (.csv, .tfm, .tra), else "
-                        "toml. study: a study.toml with its rig.toml beside it, of cameras, --ct and, if given, a pose")
+                        help="format to write; without it rig for cameras, and for poses what -o ends in, else toml; study: "
+                        "study.toml and rig.toml, of cameras and --ct")
     result.add_argument("-o", "--output", metavar="OUT", help="file to write; of formats that hold one camera, one file per camera: "
                         "OUT-NAME. Without it texts are printed")
     rig = result.add_argument_group("What camera files leave open")
@@ -60,7 +58,7 @@ def parser():
     rig.add_argument("--rig-size-px", type=_numbers(2, 1, 32768, int), metavar="COLUMNS,ROWS", help="size of the images")
     rig.add_argument("--rig-pixel-spacing-mm", type=_numbers(2, 0.01, 100), metavar="COLUMN,ROW",
                      help="spacing of columns and rows on the detector; without it the detector is put at 1.5 times the isocentre's "
-                     "distance from the source; rays do not depend on it")
+                     "distance from the source")
     rig.add_argument("--rig-isocenter-point", type=_numbers(3, -1e6, 1e6), metavar="X,Y,Z",
                      help="the rig's isocentre in its room; without it the point nearest to the cameras' central rays")
     rig.add_argument("--rig-unit-mm", type=_numbers(1, 1e-3, 1e4), metavar="MM",

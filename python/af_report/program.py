@@ -14,12 +14,10 @@ MODULES = {"jinja2": "python3-jinja2", "matplotlib": "python3-matplotlib"}
 
 def parser():
     program = argparse.ArgumentParser(
-        prog="af-report", description="Makes what people read of the numbers that af-evaluate writes. With --output one page that opens "
-        "offline, of all finished runs in the folders and below: findings, figures, tables that sort, overlays, failures with their searches "
-        "and the commands that repeat them, provenance. Without it, figures (SVG, PNG and CSV) and tables (Markdown) beside the numbers that "
-        "they are made from; tables are printed, too.", allow_abbrev=False)
+        prog="af-report", description="Makes what people read of the numbers that af-evaluate writes. With --output one page of all "
+        "finished runs in and below the folders; without it figures and tables beside their numbers.", allow_abbrev=False)
     program.add_argument("paths", metavar="PATH", nargs="+", help="Folders of results; without --output also tables (NAME.csv) of "
-                         "af-evaluate compare and held-out, whose Markdown becomes NAME.md, of jobs/rate-against-truth.sh and bench-scaling")
+                         "af-evaluate compare and held-out, jobs/rate-against-truth.sh and bench-scaling")
     program.add_argument("-o", "--output", metavar="PATH", help="The page to write")
     program.add_argument("--title", metavar="TEXT", help="The page's title (default: made from the cases' names)")
     program.add_argument("--screen", action="store_true", help="Of tables of compare: measures against optimisers instead of a row per run")

@@ -56,31 +56,25 @@ void describe_chains(Fields& field, MethodOptions& options) {
       .not_recorded(why);
   field("chain",
         options.chains,
-        "Stages in place of the preset's, separated by ';': measure, optimiser, then any of these "
+        "Stages in place of the preset's, separated by ';': measure, optimiser, and any of these "
         "keys with a number. " +
             chain_keys_help() +
-            ". Given several times, the chains are a portfolio: a judge chooses among their ends. "
-            "One that begins with 'below VALUE:' is a last resort, which runs only where the best "
-            "end so far is worth less to the judge; one that begins with 'again:' starts from that "
-            "end");
-  field(
-      "finish",
-      options.finish,
-      "Stages, written as for --chain, that follow the chain, or a portfolio's best one and those "
-      "that the judge can hardly tell from it: the value of the last stage chooses among these "
-      "(default: the preset's; none with --chain)");
+            ". Given several times, a judge takes the best end; 'below VALUE:' before a chain runs "
+            "it only below this worth, 'again:' from the best end");
+  field("finish",
+        options.finish,
+        "Stages, written as for --chain, that refine the best ends of all chains (default: the "
+        "preset's; none with --chain)");
   field("judge",
         options.judge,
-        "For a portfolio: the stage, written as for --chain, by which end poses are compared; its "
-        "measure must be rg, its optimiser is ignored (default: the preset's)");
+        "For several chains: the stage, of measure rg, that compares their ends (default: the "
+        "preset's)");
   field("judge_least_value", options.judge_least_value, "Ends below it are failures")
       .no_option("the preset's");
   field("judge_enough_value",
         options.judge_enough_value,
-        "For a portfolio: the first end that is worth this to the judge ends it, and no rivals are "
-        "finished; the worth is the share of the X-rays' gradients that an end explains, mean over "
-        "the views. 0: nearly always the first chain's end; 1: never (default: the preset's, 0.6 "
-        "of robust; 1 where chains are typed over another preset)")
+        "For several chains: stop at an end that explains this share of the X-rays' gradients; 1: "
+        "run them all (default: the preset's, 0.6 of robust)")
       .within(0.0, 1.0);
   field("smoothing_sigma_mm",
         options.smoothing_sigma_mm,
@@ -94,24 +88,21 @@ void MethodOptions::describe(Fields& field) {
   field.start_group("Method");
   describe_chains(field, *this);
   field("max_evaluations", max_evaluations, "Most poses tried per registration (default: 5000)");
-  field(
-      "region",
-      region,
-      "Where X-rays are compared: target: each view's region goes where the target box is seen, "
-      "at the start of every stage and wherever an end is judged; study: it stays where roi_px of "
-      "the study puts it (default: target; study with --preset paper)")
+  field("region",
+        region,
+        "Region where X-rays are compared: target: it follows the target box; study: it stays at "
+        "the study's roi_px (default: target; study with --preset paper)")
       .choice({kRegionOfTarget, kRegionOfStudy});
   field("fiducial_mask_mm",
         fiducial_mask_mm,
-        "Radius of the discs about the study's fiducials that registration does not see, mm on the "
-        "isocentre plane: the markers of the gold standard must neither help nor hinder what it "
-        "judges. 0: it sees them")
+        "Radius of discs about the study's fiducials that registration does not see, mm on the "
+        "isocentre plane; 0: none")
       // Larger discs would hide what is to be registered.
       .within(0.0, 50.0);
   field("threads",
         threads,
-        "Threads that one registration spreads over, on every rank; 0: as many as there are "
-        "processors for the rank. Many starts are better shared by ranks")
+        "Threads of one registration on every rank; 0: all its processors. Share many starts among "
+        "ranks instead")
       .not_deciding("results do not depend on it");
   field.start_group("");
   field("seed", seed, "Seed of the random numbers that cma-es draws").no_option("programs add it");

@@ -112,16 +112,8 @@ struct Preset {
 constexpr std::array kPresets = {
     Preset{"paper", "mutual information with best neighbour in two passes", paper_preset},
     Preset{"fast", "Gauss-Newton on correlations, coarse to fine", fast_preset},
-    Preset{
-        "robust",
-        "a portfolio: Gauss-Newton on correlations, or CMA-ES on correlations of gradients, then "
-        "Gauss-Newton on robust gradient residuals",
-        robust_preset},
-    Preset{
-        "bone",
-        "for a CT of one bone in X-rays that show more: Gauss-Newton on correlations of gradients "
-        "within its silhouette, which follows the pose",
-        bone_preset},
+    Preset{"robust", "several searches, of which a judge takes the best end", robust_preset},
+    Preset{"bone", "a CT of one bone, within its silhouette", bone_preset},
 };
 
 }  // namespace

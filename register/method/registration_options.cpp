@@ -114,27 +114,20 @@ std::string stage_text(const StageOptions& stage) {
 }  // namespace
 
 void StageOptions::describe(Fields& field) {
-  field("level",
-        level,
-        "of the pyramid. 0: the field itself; above, nodes 2^level as far apart as in a field of "
-        "about 256, X-rays blurred to match")
+  field("level", level, "of the pyramid, each twice as coarse; 0: the field itself")
       .within(0, kCoarsestLevel);
-  field("pixel_step", pixel_step, "detector pixels per stage pixel, along each axis")
-      .as("pixels")
-      .within(1, 64);
-  field("roi_scale", roi_scale, "sides of the region, as a multiple of those of the study's")
+  field("pixel_step", pixel_step, "detector pixels per stage pixel").as("pixels").within(1, 64);
+  field("roi_scale", roi_scale, "size of the region, as a multiple of the study's")
       .as("roi")
       .within(0.1, 4.0);
-  field("smoothing_sigma_mm",
-        smoothing_sigma_mm,
-        "mm on the isocentre plane: Gaussian on the X-rays (not on the DRRs), besides the level's")
+  field(
+      "smoothing_sigma_mm", smoothing_sigma_mm, "mm on the isocentre plane: Gaussian on the X-rays")
       .as("sigma")
       .at_least(0.0)
       .finite();
   field("silhouette_mm",
         silhouette_mm,
-        "mm on the isocentre plane: only the part of the region within this distance of the CT's "
-        "silhouette at the start of the stage counts; 0: all of the region")
+        "mm: only what is this near to the CT's silhouette counts; 0: the whole region")
       .as("silhouette")
       .within(0.0, 100.0);
   field.part(similarity);

@@ -19,8 +19,7 @@ namespace {
 constexpr std::array kOptimizers = {
     Optimizer{"best-neighbor", "the paper's: best of 12 neighbours", best_neighbor_search},
     Optimizer{"gauss-newton", "steps from normal equations", gauss_newton},
-    Optimizer{
-        "quasi-newton", "gauss-newton that learns missing curvature from its steps", quasi_newton},
+    Optimizer{"quasi-newton", "gauss-newton that learns curvature", quasi_newton},
     Optimizer{"gradient", "steps along the gradient", gradient_ascent},
     Optimizer{"bobyqa", "quadratic models in a trust region", bobyqa},
     Optimizer{"nelder-mead", "simplex", nelder_mead},
@@ -63,7 +62,7 @@ void OptimizerOptions::describe(Fields& field) {
       .as("step")
       .such_that(">= final_step_mm = " + number_text(final_step_mm),
                  [least = final_step_mm](double v) { return v >= least && std::isfinite(v); });
-  field("final_step_mm", final_step_mm, "mm: a search whose steps fall below has converged")
+  field("final_step_mm", final_step_mm, "mm: steps below it end the search")
       .as("final")
       .above(0.0)
       .finite();

@@ -6,8 +6,7 @@ namespace af::registration {
 void PictureOptions::describe(Fields& field) {
   field("no_pictures",
         are_left_out,
-        "Neither pictures nor folders for 3D Slicer, of af-evaluate some 15 MB and a second per "
-        "case: for batches of many runs")
+        "Write neither pictures nor folders for 3D Slicer, for batches of many runs")
       .not_deciding("registrations are the same");
 }
 

@@ -138,13 +138,11 @@ std::unique_ptr<SimilarityWorkspace> SimilarityMeasure::make_workspace() const {
 
 void SimilarityOptions::describe(Fields& field) {
   field.leave_out(name, "stands before the keys of a stage");
-  field("bins", bins, "per axis of the joint histogram (mi, nmi), of the difference (entropy)")
+  field("bins", bins, "of the histogram (mi, nmi, entropy)")
       // Smooth windows are four bins wide.
       .within(has_smooth_histogram ? 4 : 2, kMaxHistogramBins);
   field.leave_out(has_smooth_histogram, "follows from the optimiser");
-  field("residual_scale",
-        residual_scale,
-        "rg: residuals of this many times the typical X-ray gradient count half")
+  field("residual_scale", residual_scale, "rg: residuals of this many typical gradients count half")
       .as("scale")
       .above(0.0)
       .finite();

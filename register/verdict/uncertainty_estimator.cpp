@@ -36,14 +36,12 @@ void UncertaintyOptions::describe(Fields& field) {
   field.start_group("Uncertainty");
   field("no_uncertainty",
         is_left_out,
-        "Do not say how far the pose may be from the truth: no covariance, no predicted TRE. Saves "
-        "some 13 DRRs with derivatives per view. af-register's confidence is then a lower bound, "
-        "so that fewer poses are found; af-evaluate has neither confidence nor verdict");
+        "Skip covariance and predicted TRE, which saves some 13 DRRs per view; af-register then "
+        "finds fewer poses, af-evaluate gives no verdict");
   field("calibration_error_px",
         calibration_error_px,
-        "Error of the cameras' calibration to include in covariances: the standard deviation "
-        "of every view's shift along its columns and rows, px of the detector. X-rays cannot show "
-        "it")
+        "Calibration error that covariances include: standard deviation of every view's shift "
+        "along columns and rows, px")
       .at_least(0.0)
       .finite();
   field.start_group("");

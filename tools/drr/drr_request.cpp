@@ -54,25 +54,22 @@ struct DrrScene {
 };
 
 void describe_source(Fields& field, DrrOptions& options) {
-  field(
-      "field",
-      options.field,
-      "Look DRRs up in this field or atlas; its own camera is used unless --rig and --camera name "
-      "another, whose rays it has to hold")
+  field("field",
+        options.field,
+        "Look DRRs up in this field or atlas, through its own camera or one of --rig whose rays it "
+        "holds")
       .stands_for(PathRole::InputFile, ".h5");
   field("also_field",
         options.more_fields,
-        "A further field of the same CT, made for other angles or cameras; repeated. A pose is "
-        "looked up in the field whose planes hold its rays best; where two are nearly as good "
-        "their DRRs are averaged")
+        "A further field of the same CT for other angles or cameras; each pose uses the field that "
+        "holds its rays best")
       .one_at_a_time();
   field("ct", options.ct, "Cast rays through this CT (DICOM folder, NIfTI, MetaImage, NRRD)")
       .stands_for(PathRole::InputVolume, ".nrrd");
   describe_beside_ct(field, options.ct_reading);
   field("study",
         options.study,
-        "study.toml in place of --ct and --rig: rays are cast through the case's CT, and poses are "
-        "relative to its nominal pose")
+        "study.toml in place of --ct and --rig; poses are relative to its nominal pose")
       .stands_for(PathRole::InputFile, ".toml");
   field("study_case", options.study_case, "Case of the study [the only one]").as("--case");
   field("rig", options.rig, "Rig file, or c-arm-12in, or treatment-room");
@@ -115,8 +112,8 @@ void describe_output(Fields& field, DrrOptions& options) {
         "Threads that share a large DRR, or the DRRs of --poses; 0: every processor");
   field("output",
         options.output,
-        "OUT.mha, .nii.gz, .nrrd, .tif: total attenuation, float32, not scaled; OUT.png: 8 bits, "
-        "row 0 on top, bright is attenuated")
+        "OUT.mha, .nii.gz, .nrrd, .tif: total attenuation, float32; OUT.png: 8 bits, bright is "
+        "attenuated")
       .as("-o,--output")
       .stands_for(PathRole::OutputVolume, ".nrrd")
       .required();

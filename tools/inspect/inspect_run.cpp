@@ -31,10 +31,10 @@ void print(const InspectOptions& options, const std::vector<Inspection>& inspect
 
 void InspectOptions::describe(Fields& field) {
   field("paths", paths, "Files, folders or names of shipped rigs").as("PATH").one_of_group("What");
-  field("template",
-        template_name,
-        "Print a file to fill in, every key with a comment: study (af-inspect --template study > "
-        "study.toml), rig, or scan: a cone-beam scan for af-scan")
+  field(
+      "template",
+      template_name,
+      "Print a file to fill in, every key with a comment: af-inspect --template study > study.toml")
       .choice(template_names())
       .one_of_group("What");
   field("json", as_json, "Print one JSON array instead of text");
@@ -50,9 +50,8 @@ void InspectOptions::describe(Fields& field) {
       .excludes({"--json", "--list-views"});
   field("pictures",
         pictures,
-        "Of studies: folder for pictures of each view (X-ray, DRRs at the nominal pose and at that "
-        "of the landmarks, with the patient's directions), of the room and of the CT; of a CT: for "
-        "pictures of it with its coordinates in mm (LPS), to read off points")
+        "Folder for pictures of a study's views, room and CT, or of a CT with its coordinates in "
+        "mm (LPS)")
       .excludes({"--json", "--list-views", "--list-inputs"});
   field.part(ct);
   field.at("series").help =

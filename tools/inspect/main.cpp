@@ -10,10 +10,8 @@
 int main(int argc, char** argv) {
   af::InspectOptions options;
   CLI::App app{
-      "Says what files are, whether they are sane, and what they were made from: CTs (image file "
-      "or DICOM folder), X-rays and DRRs, rigs, studies, poses, fields (every checksum verified), "
-      "results and folders of results. The exit code is the worst over all paths: 0 usable, 3 "
-      "readable but unacceptable, 4 not readable or damaged."};
+      "Says what files are, whether they are sane, and what they were made from. The exit code is "
+      "the worst over all paths: 0 usable, 3 unacceptable, 4 damaged."};
   af::cli::bind_options(app, options);
   return af::cli::app_main(
       app, argc, argv, [&](const af::Communicator& world) { run_inspect(options, world); });

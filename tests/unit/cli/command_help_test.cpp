@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/command_help.h"
 
+#include <algorithm>
 #include <memory>
 
 #include <CLI/CLI.hpp>
@@ -95,6 +96,44 @@ TEST(MarkdownPage, HasARowForEveryOption) {
   EXPECT_THAT(page, HasSubstr("| `--way` | `TEXT` | `quick` | How. One of: quick, exact |\n"));
   EXPECT_THAT(page, HasSubstr("| `--nodes` | `INT` | `64` | Nodes. Must be between 2 and 128 |\n"));
   EXPECT_THAT(page, HasSubstr("| `--exact` |  |  | A flag |\n"));
+}
+
+TEST(MarkdownPage, ListsChoicesThatTheTextDoesNotExplain) {
+  CommandHelp program = shown_help();
+  for (OptionHelp& option : program.options)
+    if (option.long_name() == "--way") option.text = "quick: soon; exact: later";
+  EXPECT_THAT(markdown_page(program),
+              HasSubstr("| `--way` | `TEXT` | `quick` | quick: soon; exact: later |\n"));
+}
+
+TEST(MarkdownPage, NamesOptionsThatAnEarlierCommandHasAlike) {
+  CommandHelp program = shown_help();
+  CommandHelp command{"again", "Shows more.", program.options, {}};
+  OptionHelp& way = *std::find_if(command.options.begin(),
+                                  command.options.end(),
+                                  [](const auto& o) { return o.long_name() == "--way"; });
+  way.default_text = "exact";
+  std::erase_if(command.options, [](const OptionHelp& option) {
+    return option.long_name() != "--way" && option.long_name() != "--output" &&
+           option.long_name() != "--nodes";
+  });
+  program.commands = {command};
+  const std::string page = markdown_page(program);
+  EXPECT_THAT(page,
+              HasSubstr("## af-show again\n\nShows more.\n\n"
+                        "| Option | Value | Default | What it does |\n|---|---|---|---|\n"
+                        "| `--way` | `TEXT` | `exact` | How. One of: quick, exact |\n\n"
+                        "As above: `--output`, `--nodes`.\n"));
+}
+
+TEST(CommandHelp, HasTheHelpOfAProgramButNotOfItsGroupsOfOptions) {
+  CLI::App program{"program"};
+  std::string file;
+  program.add_option_group("one of")->add_option("--file", file, "A file");
+  std::vector<std::string> names;
+  for (const OptionHelp& option : command_help(program).options)
+    names.push_back(option.long_name());
+  EXPECT_THAT(names, testing::ElementsAre("--help", "--file"));
 }
 
 TEST(ManPage, SaysWhatTheProgramDoesInItsName) {
