@@ -399,9 +399,9 @@ TEST_F(MovedT12, HasItsOwnPoseInTheTruthAndTheRestHasThatOfTheSameStudyWithoutIt
   EXPECT_GE(displacement_mm, 2.0);
   const std::string key = "displacement_mm = ";
   EXPECT_NEAR(std::stod(text.substr(text.find(key) + key.size())), displacement_mm, 1e-6);
-  EXPECT_NE(text.find("name = \"T12\""), std::string::npos);
-  EXPECT_NE(moved.note.find("T12 turned by "), std::string::npos) << moved.note;
-  EXPECT_NE(read_text_file(scratch_ / "moved" / "provenance.json").find("T12 turned by "),
+  EXPECT_NE(text.find("name = \"T10\""), std::string::npos);
+  EXPECT_NE(moved.note.find("T10 turned by "), std::string::npos) << moved.note;
+  EXPECT_NE(read_text_file(scratch_ / "moved" / "provenance.json").find("T10 turned by "),
             std::string::npos);
   // The pins' gold pose is the bone's.
   std::vector<FiducialView> views;
