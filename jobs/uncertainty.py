@@ -29,12 +29,21 @@ COLUMNS = ["case", "tre_mm", "mrpd_mm", "judge_fine_mean", "judge_excess", "cova
            "sandwich_tre_mm", "predicted_tre_95_mm", "confidence"]
 
 
+def number_of(cells, name):
+    return float(cells[name]) if cells[name] not in ("", "nan") else math.nan
+
+
+def succeeded(cells, views):
+    """By the TRE; by the mRPD with one view, which shows no depth."""
+    return number_of(cells, "tre_mm" if views > 1 else "mrpd_mm") < SUCCESS_MM
+
+
 class Row:
-    """What is needed of one registration. It succeeded by its TRE; by its mRPD with one view, which shows no depth."""
+    """What is needed of one registration."""
 
     def __init__(self, measure, variant, views, cells):
         def number(name):
-            return float(cells[name]) if cells[name] not in ("", "nan") else math.nan
+            return number_of(cells, name)
 
         self.measure = measure
         self.variant = variant
@@ -46,7 +55,7 @@ class Row:
         self.is_for_fit = drawn is not None and self.number % 2 == 1
         self.half = "real" if drawn is None else "odd" if self.is_for_fit else "even"
         self.tre = number("tre_mm")
-        self.is_success = (self.tre if views > 1 else number("mrpd_mm")) < SUCCESS_MM
+        self.is_success = succeeded(cells, views)
         self.fine_mean = number("judge_fine_mean")
         self.excess = number("judge_excess")
         inflation = number("covariance_inflation")
@@ -406,20 +415,25 @@ def refuse(what, why):
     sys.exit(4)
 
 
-def rows_of(path, measure, variant, views):
+def cells_of(path, columns):
+    """The lines of a table of registrations, as dictionaries; refused are tables without one of the columns, and cut ones."""
     with open(path, newline="", encoding="utf-8") as file:
         table = csv.DictReader(file)
-        missing = [column for column in COLUMNS if column not in (table.fieldnames or [])]
+        missing = [column for column in columns if column not in (table.fieldnames or [])]
         if missing:
             refuse(path, f"has no column '{missing[0]}': made with --no-uncertainty, or no table of registrations")
-        rows = []
+        lines = []
         for cells in table:
-            if any(cells[column] is None for column in COLUMNS):
+            if any(cells[column] is None for column in columns):
                 refuse(path, f"line {table.line_num} is cut off")
-            rows.append(Row(measure, variant, views, cells))
-    if not rows:
+            lines.append(cells)
+    if not lines:
         refuse(path, "holds no registration")
-    return rows
+    return lines
+
+
+def rows_of(path, measure, variant, views):
+    return [Row(measure, variant, views, cells) for cells in cells_of(path, COLUMNS)]
 
 
 def finished_tables(population, condition):

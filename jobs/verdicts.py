@@ -5,43 +5,31 @@ studies (jobs/population.sh), counted by X-ray pair (a case of one variant, with
 and of wrong ends, with bones that have moved apart from rigid patients; and how often the predicted TRE holds. Needs
 nothing but Python."""
 import argparse
-import csv
 import math
 import pathlib
 import statistics
 import sys
 
-from uncertainty import finished_tables, refuse
+from uncertainty import cells_of, finished_tables, number_of, refuse, succeeded
 
-SUCCESS_MM = 2.5
 COLUMNS = ["case", "tre_mm", "mrpd_mm", "verdict", "predicted_tre_95_mm"]
 
 
 class End:
-    """What is needed of one registration. It is right by its TRE; by its mRPD with one view, which shows no depth."""
+    """What is needed of one registration."""
 
     def __init__(self, views, cells):
-        def number(name):
-            return float(cells[name]) if cells[name] not in ("", "nan") else math.nan
-
         self.verdict = cells["verdict"]
-        self.tre_mm = number("tre_mm")
-        self.is_right = number("tre_mm" if views > 1 else "mrpd_mm") < SUCCESS_MM
-        self.bound_mm = number("predicted_tre_95_mm")
+        self.tre_mm = number_of(cells, "tre_mm")
+        self.is_right = succeeded(cells, views)
+        self.bound_mm = number_of(cells, "predicted_tre_95_mm")
 
 
 def pairs_of(path, views):
     """The ends of every case of a table of registrations."""
     pairs = {}
-    with open(path, newline="", encoding="utf-8") as file:
-        table = csv.DictReader(file)
-        missing = [column for column in COLUMNS if column not in (table.fieldnames or [])]
-        if missing:
-            refuse(path, f"has no column '{missing[0]}'")
-        for cells in table:
-            if any(cells[column] is None for column in COLUMNS):
-                refuse(path, f"line {table.line_num} is cut off")
-            pairs.setdefault(cells["case"], []).append(End(views, cells))
+    for cells in cells_of(path, COLUMNS):
+        pairs.setdefault(cells["case"], []).append(End(views, cells))
     return list(pairs.values())
 
 

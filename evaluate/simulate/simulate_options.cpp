@@ -93,6 +93,16 @@ void describe_truth(Fields& field, SimulateOptions& o) {
   field("no_fiducials", o.omits_fiducials, "No steel pins (four of 2 x 6 mm otherwise)");
 }
 
+/// The option that names a bone as the target; empty without.
+std::string bone_option(const SimulateOptions& options) {
+  if (!options.moved_bone.empty()) return "moved-bone";
+  return options.target_bone.empty() ? "" : "target-bone";
+}
+
+const std::string& bone_of(const SimulateOptions& options) {
+  return options.moved_bone.empty() ? options.target_bone : options.moved_bone;
+}
+
 void append_scan_problems(const SimulateOptions& options, std::vector<std::string>& found) {
   const ConeBeamOptions& scan = options.cone_beam;
   if (scan.views == 0) {
@@ -103,24 +113,14 @@ void append_scan_problems(const SimulateOptions& options, std::vector<std::strin
   if (!options.stress.names.empty())
     found.push_back(
         "stress: applies to studies only; a scan's X-rays have the Imaging effects alone");
-  if (!options.moved_bone.empty())
-    found.push_back("moved-bone: applies to studies only; a scan's X-rays show what its CT holds");
+  if (const std::string option = bone_option(options); !option.empty())
+    found.push_back(option + ": applies to studies only; a scan's X-rays show what its CT holds");
   if (options.xray_format != "mha")
     found.push_back("xray_format = " + options.xray_format + ": a scan's X-rays are mha");
   for (const double elevation : scan.elevations_deg)
     if (!(std::abs(elevation) <= 80.0))
       found.push_back("elevations_deg = " + number_text(elevation) +
                       ": must be between -80 and 80 degrees");
-}
-
-/// The option that names a bone as the target; empty without.
-std::string bone_option(const SimulateOptions& options) {
-  if (!options.moved_bone.empty()) return "moved-bone";
-  return options.target_bone.empty() ? "" : "target-bone";
-}
-
-const std::string& bone_of(const SimulateOptions& options) {
-  return options.moved_bone.empty() ? options.target_bone : options.moved_bone;
 }
 
 void append_bone_problems(const SimulateOptions& options, std::vector<std::string>& found) {

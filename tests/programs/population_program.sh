@@ -26,6 +26,8 @@ refuse() {
 refuse 2 "'3' must name 2, 1 or both" population --views 3
 refuse 2 'must name some of spine, pelvis, head' population --kinds leg
 refuse 4 'no registrations are finished yet' population --tables
+refuse 2 'moved+all needs all before it' population --variants moved+all,all
+refuse 2 'a bone moves in drawn patients, not in a --ct' population --variants clean,moved --ct one="$root/README.md"
 
 population || fail "population.sh: $(cat out err)"
 tables=pop/tables
@@ -118,6 +120,19 @@ for damage in 's/,squared_distance//' '2s/,.*//' "2,\$d" 's/^spine-001/spine-002
   sed -i "$damage" damaged/runs/clean-2-fast/spine-001/registrations.csv
   refuse 4 'squared_distance\|is cut off\|holds no registration\|of a patient to fit' "${uncertainty[@]}" damaged
 done
+
+# Verdicts of a pair with a right and a wrong end, both found, and a bound that the right one keeps.
+verdicts=(prefix/libexec/attenuation-fields/jobs/verdicts.py)
+cp -r right judged
+awk -F, -v OFS=, 'NR == 1 { for (i = 1; i <= NF; ++i) at[$i] = i }
+  NR > 1 { $at["verdict"] = "found"; $at["predicted_tre_95_mm"] = 0.6 } NR == 3 { $at["tre_mm"] = 9 } 1' \
+  right/runs/clean-2-fast/spine-001/registrations.csv >judged/runs/clean-2-fast/spine-001/registrations.csv
+"${verdicts[@]}" judged >out 2>err || fail "verdicts.py: $(cat err)"
+grep -q '^| clean-2-fast | 1 | 2 | 1 of 1: 100.0 % (21 to 100) | 0 | 0 | 1 | 0 | 0 | 1 | 1 |$' out || fail "verdicts.py wrote $(cat out)"
+grep -q '^| clean-2-fast | 1 | 1 of 1: 100.0 % (21 to 100) | 0.500 | 0.600 | 1.2 |$' out || fail "verdicts.py wrote $(cat out)"
+refuse 4 'holds no registrations' "${verdicts[@]}" missing
+sed -i 's/,verdict,/,judgement,/' judged/runs/clean-2-fast/spine-001/registrations.csv
+refuse 4 "has no column 'verdict'" "${verdicts[@]}" judged
 
 evaluate=("$programs/af-evaluate" population -o refused)
 refuse 2 'condition' "${evaluate[@]}"

@@ -233,6 +233,7 @@ TEST_F(AfSimulate, RefusesBadInputByTheContractsCodesAndLeavesNothing) {
       {coarse + "--moved-bone jaw", 3, "must be one of T9, T10, T11, T12, L1, L2, L3"},
       {"--phantom head --moved-bone T12", 3, "moved-bone = 'T12': must be one of jaw"},
       {coarse + "--moved-bone T12 --cone-beam 8", 3, "moved-bone: applies to studies only"},
+      {coarse + "--target-bone T12 --cone-beam 8", 3, "target-bone: applies to studies only"},
       {"--ct a --target-bone T12", 3, "target-bone: applies to --phantom only"},
       {"--phantom head --target-bone T12", 3, "target-bone = 'T12': must be one of jaw"},
       {coarse + "--target-bone T12 --moved-bone L1", 3, "target-bone: not with --moved-bone"},
