@@ -218,8 +218,10 @@ class SharedFile {
     }
   }
 
-  /// Collective.
+  /// Collective. Open MPI may lose what a collective write could not store without a word; then
+  /// this fails, or what is read back differs.
   void close() {
+    const WorkNote note("closing the file that all ranks wrote");
     naming_file(path_,
                 [&] { checked(H5Fclose(std::exchange(file_, H5I_INVALID_HID)), "H5Fclose"); });
   }
