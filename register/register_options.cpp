@@ -18,8 +18,9 @@ void describe_start(Fields& field, RegisterOptions& options) {
   field("start",
         options.start,
         "Start when no other is given: nominal; landmarks, from landmarks_ct_mm and landmarks_px; "
-        "auto: landmarks where there are any")
-      .choice({"auto", "nominal", "landmarks"});
+        "search, the likeliest poses of a whole range; auto: landmarks where there are any")
+      .choice({"auto", "nominal", "landmarks", "search"});
+  field.part(options.search);
   field("start_pose",
         options.start_pose,
         "Start: file with one pose as TOML, JSON, CSV or ITK text (docs/poses.md)")
@@ -106,6 +107,7 @@ std::vector<std::string> problems(const RegisterOptions& options) {
         "the CT");
   if (options.correction.is_wanted && options.renderer == "raycast")
     found.emplace_back(kCorrectsRayCasting);
+  for (const std::string& text : problems(options.search)) found.push_back(text);
   for (const std::string& text : field_problems(options)) found.push_back(text);
   return found;
 }

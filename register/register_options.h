@@ -12,6 +12,7 @@
 #include "register/field_paths.h"
 #include "register/method/method_options.h"
 #include "register/results/picture_options.h"
+#include "register/search/pose_search.h"
 #include "register/verdict/uncertainty_estimator.h"
 
 namespace af::registration {
@@ -27,7 +28,9 @@ struct RegisterOptions {
   UncertaintyOptions uncertainty;
   std::optional<std::array<double, 3>> start_rotation_deg;
   std::optional<std::array<double, 3>> start_translation_mm;
-  std::string start = "auto";  ///< or "nominal" or "landmarks", when no other start is given
+  /// Or "nominal", "landmarks" or "search", when no other start is given.
+  std::string start = "auto";
+  PoseSearchOptions search;  ///< of start "search"
   std::filesystem::path start_pose;
   std::filesystem::path starts;
   AttenuationModel attenuation;  ///< of ray casting

@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cstddef>
 #include <filesystem>
 #include <iostream>
 #include <map>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <numeric>
 #include <optional>
 
@@ -82,6 +84,7 @@ struct CaseToRegister {
   Shared<Study> study;
   StudyCase of;
   std::optional<LandmarkPose> landmarks;  ///< when they are the start
+  nlohmann::json search;                  ///< when a search found the starts; rank 0
   std::vector<RigidTransform> starts;
   std::optional<GoldStandard> gold;
 };
@@ -92,13 +95,14 @@ void warn_of(const std::vector<std::string>& texts, const Communicator& world) {
 
 /// Collective.
 CaseToRegister read_case(const RegisterOptions& options, const Communicator& world) {
-  CaseToRegister found{shared_study(options.study, world), {}, {}, {}, {}};
+  CaseToRegister found{shared_study(options.study, world), {}, {}, {}, {}, {}};
   found.of = all_or_none(world, [&] { return found.study->find_case(options.case_name); });
   if (starts_from_landmarks(options, found.of))
     found.landmarks = all_or_none(world, [&] { return landmark_pose(found.study, found.of); });
   std::vector<std::string> notes;
   found.starts = shared_poses(world, [&] {
     if (found.landmarks.has_value()) return std::vector{found.landmarks->room_from_ct};
+    if (options.start == "search") return std::vector<RigidTransform>();  // find_starts()
     return start_poses(
         options, {found.of.frame(), conversion_options(options.study, found.of.name)}, notes);
   });
@@ -114,6 +118,8 @@ LoadedCase load_problem(const RegisterOptions& options,
                         const std::shared_ptr<ThreadPool>& pool,
                         const Communicator& world) {
   CaseLoadOptions load = case_load_options(options, method.coarsest_level(), method.last_levels());
+  if (options.start == "search")
+    load.coarsest_level = std::max(load.coarsest_level, coarsest_level(options.search));
   load.judging_level = PoseExaminer::coarsest_level();
   load.region_follows_target = method.region_follows_target;
   load.pool = pool;
@@ -123,6 +129,49 @@ LoadedCase load_problem(const RegisterOptions& options,
   for (const auto& [input, text] : loaded.input_notes)
     inform(world, std::string(input).append(": ").append(text));
   return loaded;
+}
+
+nlohmann::json search_json(const PoseSearch& search,
+                           const std::vector<PoseMode>& modes,
+                           double seconds) {
+  nlohmann::json likenesses = nlohmann::json::array();
+  for (const PoseMode& mode : modes) likenesses.push_back(mode.likeness);
+  return {{"range", search.range().text()},
+          {"rotations", search.rotation_count()},
+          {"likeness_per_start", likenesses},
+          {"seconds", seconds}};
+}
+
+std::string search_text(const PoseSearch& search,
+                        const std::vector<PoseMode>& modes,
+                        double seconds) {
+  return "search      " + std::to_string(search.rotation_count()) + " rotations, " +
+         search.range().text() + ", in " + fixed_text(seconds, 2) +
+         " s: " + std::to_string(modes.size()) + " starts, likeness " +
+         joined(modes, ", ", [](const PoseMode& mode) { return fixed_text(mode.likeness, 2); }) +
+         "\n";
+}
+
+/// Collective. Rank 0 looks for starts where they are not known.
+void find_starts(const RegisterOptions& options,
+                 const RegistrationProblem& problem,
+                 const std::shared_ptr<ThreadPool>& pool,
+                 const Communicator& world,
+                 CaseToRegister& registered) {
+  if (options.start != "search") return;
+  const WorkNote note("searching for starts", WorkNote::Kind::Phase);
+  registered.starts = shared_poses(world, [&] {
+    const auto begin = std::chrono::steady_clock::now();
+    const PoseSearch search(problem, options.search, pool);
+    const std::vector<PoseMode> modes = search.modes();
+    const double seconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    registered.search = search_json(search, modes, seconds);
+    std::cout << search_text(search, modes, seconds);
+    std::vector<RigidTransform> starts;
+    for (const PoseMode& mode : modes) starts.push_back(mode.room_from_ct);
+    return starts;
+  });
 }
 
 /// README.md, "With or without fields", measures 14 registrations on a skull; a margin for finer
@@ -139,9 +188,10 @@ RunDescription description_of(const RegisterOptions& in_force,
                               const std::string& command_line,
                               const Communicator& world) {
   RunDescription description{
-      registered.of.name, in_force.renderer, {}, {}, !in_force.pictures.are_left_out};
+      registered.of.name, in_force.renderer, {}, {}, {}, !in_force.pictures.are_left_out};
   if (registered.landmarks.has_value())
     description.landmarks = to_json(*registered.landmarks, registered.of);
+  description.search = registered.search;
   description.provenance = {"af-register",
                             command_line,
                             to_toml(in_force),
@@ -189,6 +239,7 @@ void write_results(const RegisterOptions& options,
                    RunFolder& folder) {
   add_target_errors(registered, records);
   RegistrationRecord& best = records[best_record(records)];
+  if (options.start == "search") set_rival(*registration.problem, records, best);
   registration.diagnose(best);
   warn_of(best.diagnosis.messages, world);
   warn_of_clipped(records, world);
@@ -237,7 +288,7 @@ void run_registration(const RegisterOptions& typed,
                       const Communicator& world) {
   const RegistrationOptions method = method_of(typed, world);
   RunFolder folder({typed.output_folder, result_file_names(), typed.resume.restarts}, world);
-  const CaseToRegister registered = read_case(typed, world);
+  CaseToRegister registered = read_case(typed, world);
   RegisterOptions options = typed;
   options.renderer = renderer_of(typed, registered.of);
   if (options.renderer == "raycast" && options.renderer != typed.renderer && world.is_root())
@@ -246,6 +297,7 @@ void run_registration(const RegisterOptions& typed,
   LoadedCase loaded = load_problem(options, method, registered, pool, world);
   loaded.xray_readers.clear();  // no other X-rays follow
   const auto& problem = loaded.problem;
+  find_starts(options, *problem, pool, world, registered);
   Registration registration = all_or_none(world, [&] {
     Registration made(problem, method, pool);
     made.examine_ends(options.uncertainty, pool);

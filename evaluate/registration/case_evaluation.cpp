@@ -90,6 +90,8 @@ StratifiedStarts make_starts(const RegistrationStudyOptions& options,
       motion_limit(methods));
   if (!options.starts_from.empty())
     return given_starts(options, study, study_case, yardstick, measures, notes);
+  if (options.start_rule == "search")
+    return starts_at(measures, std::array{study_case.nominal_room_from_ct});
   if (options.start_rule == "within-range") return starts_within_range(measures, "--start-rule");
   return options.start_rule == "uniform" ? uniform_starts(measures) : stratified_starts(measures);
 }
@@ -159,7 +161,9 @@ TracedRow traced_row(Method& method,
   RegistrationRow& row = traced.row;
   row = registered_row(
       [&](const RigidTransform& room_from_ct) {
-        RegistrationRecord record = method.registration.run(room_from_ct, index);
+        RegistrationRecord record = method.registration.pose_search.has_value()
+                                        ? method.registration.run_everywhere(index)
+                                        : method.registration.run(room_from_ct, index);
         trace = std::move(record.result.trace);
         return record;
       },
@@ -513,6 +517,18 @@ RegistrationRow registered_row(
   return row;
 }
 
+namespace {
+
+/// Of the image pyramids, for verdicts and a search of starts.
+int levels_beyond_stages(const RegistrationStudyOptions& options,
+                         const registration::UncertaintyOptions& uncertainty) {
+  const int judging = uncertainty.is_left_out ? 0 : PoseExaminer::coarsest_level();
+  return options.start_rule == "search" ? std::max(judging, coarsest_level(options.search))
+                                        : judging;
+}
+
+}  // namespace
+
 CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
                              const Study& study,
                              const StudyCase& study_case,
@@ -528,17 +544,17 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
   std::vector<Method> methods;
   registration::UncertaintyOptions uncertainty = options.uncertainty;
   uncertainty.is_left_out = uncertainty.is_left_out || options.is_starts_only;
-  for (LoadedMethod& method :
-       load_methods(options,
-                    options.correction,
-                    study,
-                    study_case,
-                    world,
-                    evaluation.inputs,
-                    uncertainty.is_left_out ? 0 : PoseExaminer::coarsest_level(),
-                    kept_fields)) {
+  for (LoadedMethod& method : load_methods(options,
+                                           options.correction,
+                                           study,
+                                           study_case,
+                                           world,
+                                           evaluation.inputs,
+                                           levels_beyond_stages(options, uncertainty),
+                                           kept_fields)) {
     all_or_none(world, [&] {
       if (!uncertainty.is_left_out) method.registration.examine_ends(uncertainty);
+      if (options.start_rule == "search") method.registration.look_for_starts(options.search);
       methods.push_back(
           {method.renderer, std::move(method.registration), {}, options.success_tre_mm});
     });

@@ -326,6 +326,7 @@ std::vector<std::string> RegistrationStudyOptions::renderers() const {
 std::vector<std::string> problems(const RegistrationStudyOptions& options) {
   std::vector<std::string> found = problems(options.start_options());
   append_problems(options, found);
+  for (const std::string& text : problems(options.search)) found.push_back(text);
   for (const std::string& text : field_problems(options)) found.push_back(text);
   const auto require_part = [&](const char* name, const std::optional<int>& part, int whole) {
     if (part.has_value() && !(*part >= 1 && *part <= whole))
@@ -364,9 +365,10 @@ void describe_starts(Fields& field, RegistrationStudyOptions& options) {
   field("start_rule",
         options.start_rule,
         "Where starts are drawn: stratified, equally many per interval, as in the paper; uniform "
-        "over all intervals; or within-range, equally many per interval inside the fields' motion "
-        "range")
-      .choice({"stratified", "uniform", "within-range"});
+        "over all intervals; within-range, equally many per interval inside the fields' motion "
+        "range; or search: one registration per case, which looks for its starts itself")
+      .choice({"stratified", "uniform", "within-range", "search"});
+  field.part(options.search);
   field("starts_from",
         options.starts_from,
         "starts.csv instead of drawn starts: case, and m00 ... m23 of room_from_ct or start_rx_deg "

@@ -13,6 +13,7 @@
 #include "evaluate/starts/perturbed_starts.h"
 #include "evaluate/statistics/success_rate.h"
 #include "register/results/picture_options.h"
+#include "register/search/pose_search.h"
 #include "register/verdict/uncertainty_estimator.h"
 
 namespace af::evaluation {
@@ -27,7 +28,8 @@ struct RegistrationStudyOptions : MethodOptions {
   double interval_width_mm = 2.0;
   std::optional<int> raycast_starts_per_interval;  ///< with "both"; default: as many
   std::optional<int> raycast_intervals;            ///< with "both"; default: as many
-  std::string start_rule = "stratified";           ///< or "uniform", "within-range"
+  std::string start_rule = "stratified";           ///< or "uniform", "within-range", "search"
+  registration::PoseSearchOptions search;          ///< of start rule "search"
   std::filesystem::path starts_from;               ///< starts.csv instead of drawn ones
   bool is_starts_only = false;                     ///< write starts.csv and register nothing
   registration::PictureOptions pictures;

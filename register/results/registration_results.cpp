@@ -103,28 +103,6 @@ std::string counts_text(const std::vector<RegistrationRecord>& records) {
   });
 }
 
-}  // namespace
-
-bool is_better(const RegistrationRecord& a, const RegistrationRecord& b) {
-  const bool a_has = std::isfinite(a.result.similarity);
-  const bool b_has = std::isfinite(b.result.similarity);
-  if (a_has != b_has) return a_has;
-  const bool a_is_found = judgement_of(a).verdict != Verdict::NotFound;
-  const bool b_is_found = judgement_of(b).verdict != Verdict::NotFound;
-  if (a_is_found != b_is_found) return a_is_found;
-  if (a_has && a.result.similarity != b.result.similarity)
-    return a.result.similarity > b.result.similarity;
-  return a.start_index < b.start_index;
-}
-
-std::size_t best_record(const std::vector<RegistrationRecord>& records) {
-  check(!records.empty(), "a run has at least one record");
-  const auto best = std::min_element(records.begin(), records.end(), is_better);
-  return static_cast<std::size_t>(best - records.begin());
-}
-
-namespace {
-
 bool is_not_found(const RegistrationRecord& record) {
   return judgement_of(record).verdict == Verdict::NotFound;
 }
@@ -174,6 +152,12 @@ json uncertainty_json(const RegistrationRecord& record) {
           {"confidence", number_or_null(report.confidence)}};
 }
 
+/// null: all starts ended at the same place.
+json rival_json(const std::optional<RivalEnd>& rival) {
+  if (!rival.has_value()) return nullptr;
+  return {{"apart_mm", rival->apart_mm}, {"share", rival->share}};
+}
+
 json correction_json(const CorrectionReport& correction) {
   return {{"casts_per_view", correction.casts},
           {"moved_mm", number_or_null(correction.moved_mm)},
@@ -210,6 +194,10 @@ json result_json(const RegistrationRecord& record,
   output["start_parameters_relative_to_nominal"] =
       parameters_json(parameters_from_pose(frame, result.start_room_from_ct));
   if (!run.landmarks.is_null()) output["start_landmarks"] = run.landmarks;
+  if (!run.search.is_null()) {
+    output["start_search"] = run.search;
+    output["rival"] = rival_json(record.rival);
+  }
   output["similarity"] = number_or_null(result.similarity);
   output["evaluations"] = result.evaluations;
   output["inadmissible_evaluations"] = result.inadmissible;

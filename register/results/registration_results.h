@@ -13,19 +13,13 @@
 
 namespace af::registration {
 
-/// Order of records by similarity, highest first; those that are not found come after the others,
-/// those without a similarity last, ties go by start index.
-bool is_better(const RegistrationRecord& a, const RegistrationRecord& b);
-
-/// Index of the best record; `records` is not empty.
-std::size_t best_record(const std::vector<RegistrationRecord>& records);
-
 /// What all records of a run share.
 struct RunDescription {
   std::string case_name;
   std::string renderer;  ///< "field" or "raycast"
   Provenance provenance;
   nlohmann::json landmarks;  ///< what gave the start, with residuals; null: another start
+  nlohmann::json search;     ///< what a search found, with likenesses; null: no search
   bool has_pictures = true;  ///< --no-pictures: neither overlays nor slicer/
 };
 

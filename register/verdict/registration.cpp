@@ -458,6 +458,23 @@ void Run::run_portfolio() {
                                                                     : best.stop_reason;
 }
 
+/// Ends nearer than this to each other are the same place: the wrong ones among them lie this far
+/// from the right one at most.
+constexpr double kElsewhereMm = 10.0;
+
+/// An end with a rival of this share or more is doubtful.
+constexpr double kAmbiguousShare = 0.9;
+
+const std::vector<Eigen::Vector3d>& points_of(const RegistrationProblem& problem) {
+  return problem.target_points_ct.empty() ? problem.scaling_points_ct : problem.target_points_ct;
+}
+
+std::string ambiguity_text(const RivalEnd& rival) {
+  return "ambiguous: an end " + std::to_string(std::lround(rival.apart_mm)) +
+         " mm from here explains the X-rays " + std::to_string(std::lround(100.0 * rival.share)) +
+         " % as well";
+}
+
 }  // namespace
 
 Registration::Registration(std::shared_ptr<const RegistrationProblem> of_problem,
@@ -539,6 +556,23 @@ RegistrationRecord Registration::run(const RigidTransform& start_room_from_ct,
   return record;
 }
 
+void Registration::look_for_starts(const PoseSearchOptions& options,
+                                   const std::shared_ptr<ThreadPool>& threads) {
+  pose_search.emplace(*problem, options, threads);
+}
+
+RegistrationRecord Registration::run_everywhere(std::int64_t start_index) {
+  check(pose_search.has_value(), "look_for_starts() comes first");
+  const Clock::time_point begin = Clock::now();
+  std::vector<RegistrationRecord> records;
+  for (const PoseMode& mode : pose_search->modes())
+    records.push_back(run(mode.room_from_ct, start_index));
+  RegistrationRecord best = records[best_record(records)];
+  set_rival(*problem, records, best);
+  best.result.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
+  return best;
+}
+
 ObjectiveValue Registration::similarity_at(const RigidTransform& room_from_ct) {
   return judge.has_value() ? value_of_judge(*judge, *problem, room_from_ct)
                            : stages.back().value_at(*problem, room_from_ct);
@@ -561,6 +595,8 @@ Judgement judgement_of(const RegistrationRecord& record) {
     for (const std::string& doubt :
          doubts_of(result, record.view_values, record.uncertainty.target))
       reasons.push_back(doubt);
+  if (record.rival.has_value() && record.rival->share >= kAmbiguousShare)
+    reasons.push_back(ambiguity_text(*record.rival));
   if (!reasons.empty() && judgement.verdict == Verdict::Found) {
     judgement.verdict = Verdict::Doubtful;
     reasons.push_back("but for that " + judgement.reason);
@@ -574,6 +610,39 @@ Judgement judgement_of(const RegistrationRecord& record) {
                       " and was clipped into it");
   judgement.reason = joined(reasons, "; ");
   return judgement;
+}
+
+bool is_better(const RegistrationRecord& a, const RegistrationRecord& b) {
+  const bool a_has = std::isfinite(a.result.similarity);
+  const bool b_has = std::isfinite(b.result.similarity);
+  if (a_has != b_has) return a_has;
+  const bool a_is_found = judgement_of(a).verdict != Verdict::NotFound;
+  const bool b_is_found = judgement_of(b).verdict != Verdict::NotFound;
+  if (a_is_found != b_is_found) return a_is_found;
+  if (a_has && a.result.similarity != b.result.similarity)
+    return a.result.similarity > b.result.similarity;
+  return a.start_index < b.start_index;
+}
+
+std::size_t best_record(const std::vector<RegistrationRecord>& records) {
+  check(!records.empty(), "a run has at least one record");
+  const auto best = std::min_element(records.begin(), records.end(), is_better);
+  return static_cast<std::size_t>(best - records.begin());
+}
+
+void set_rival(const RegistrationProblem& problem,
+               const std::vector<RegistrationRecord>& records,
+               RegistrationRecord& record) {
+  record.rival.reset();
+  if (!record.result.has_pose()) return;
+  for (const RegistrationRecord& other : records) {
+    if (!other.result.has_pose()) continue;
+    const double apart_mm =
+        mean_tre_mm(other.result.room_from_ct, record.result.room_from_ct, points_of(problem));
+    const double share = other.result.similarity / record.result.similarity;
+    if (apart_mm >= kElsewhereMm && (!record.rival.has_value() || share > record.rival->share))
+      record.rival = RivalEnd{apart_mm, share};
+  }
 }
 
 }  // namespace af::registration

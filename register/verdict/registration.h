@@ -13,6 +13,7 @@
 #include "base/thread_pool.h"
 #include "register/method/prepared_stage.h"
 #include "register/method/registration_result.h"
+#include "register/search/pose_search.h"
 #include "register/verdict/pose_examiner.h"
 #include "register/verdict/target_examiner.h"
 #include "register/verdict/uncertainty_estimator.h"
@@ -27,6 +28,12 @@ struct TargetErrors {
   double tre_mm = 0.0;
 };
 
+/// Of the ends of other starts that lie elsewhere, the one that explains the X-rays best.
+struct RivalEnd {
+  double apart_mm = 0.0;  ///< from the end, mean over the target box
+  double share = 0.0;     ///< of the end's similarity
+};
+
 /// One registration, and what is said of its end.
 struct RegistrationRecord {
   std::int64_t start_index = 0;
@@ -35,6 +42,7 @@ struct RegistrationRecord {
   UncertaintyReport uncertainty;       ///< of UncertaintyEstimator, likewise
   ViewDiagnosis diagnosis;             ///< where X-rays were looked into: Registration::diagnose()
   std::optional<TargetErrors> errors;  ///< when the gold pose is known
+  std::optional<RivalEnd> rival;       ///< where starts were searched: see set_rival()
 
   /// What the registration itself found; the rest is derived from it.
   auto members() { return std::tie(start_index, result, view_values, uncertainty); }
@@ -59,6 +67,10 @@ class Registration {
   void examine_ends(const UncertaintyOptions& options,
                     const std::shared_ptr<ThreadPool>& threads = nullptr);
 
+  /// Lets run_everywhere() look for starts. InputError as of PoseSearch.
+  void look_for_starts(const PoseSearchOptions& options,
+                       const std::shared_ptr<ThreadPool>& threads = nullptr);
+
   // The parts, in the order in which a start meets them. They are made for each other: read them,
   // but assign none.
 
@@ -71,6 +83,7 @@ class Registration {
   std::optional<PoseExaminer> examiner;             ///< values the end view by view
   std::optional<TargetExaminer> target_examiner;    ///< asks the target of an end that is found
   std::optional<UncertaintyEstimator> uncertainty;  ///< how far the end may be from the truth
+  std::optional<PoseSearch> pose_search;            ///< finds starts where none is known
 
   /// From a start to its end: chain by chain, stage by stage, the choice among their ends, the
   /// finish, the correction. `start_index` is a key of random numbers.
@@ -79,6 +92,9 @@ class Registration {
   /// search(), and what examiner and uncertainty say of its end.
   [[nodiscard]] RegistrationRecord run(const RigidTransform& start_room_from_ct,
                                        std::int64_t start_index = 0);
+  /// run() from every pose that the search finds; the best record, with its rival and the seconds
+  /// of all.
+  [[nodiscard]] RegistrationRecord run_everywhere(std::int64_t start_index = 0);
   /// Looks into X-rays that do not fit the end of a record of run() (ViewDiagnoser).
   void diagnose(RegistrationRecord& record);
 
@@ -97,5 +113,18 @@ class Registration {
 /// found nothing, at least doubtful where something else leaves a doubt. The reason names all of
 /// it, and tells of a clipped start.
 Judgement judgement_of(const RegistrationRecord& record);
+
+/// Order of records by similarity, highest first; those that are not found come after the others,
+/// those without a similarity last, ties go by start index.
+bool is_better(const RegistrationRecord& a, const RegistrationRecord& b);
+
+/// Index of the best record; `records` is not empty.
+std::size_t best_record(const std::vector<RegistrationRecord>& records);
+
+/// Sets the rival of a record among those of one problem: nothing where all others that have an end
+/// ended at the same place. \test Registration.AnEndElsewhereThatIsAsAlikeIsARival
+void set_rival(const RegistrationProblem& problem,
+               const std::vector<RegistrationRecord>& records,
+               RegistrationRecord& record);
 
 }  // namespace af::registration

@@ -8,10 +8,12 @@ af_add_test(
           unit/register/method/method_options_test.cpp unit/register/problem/parameter_scaling_test.cpp
           unit/register/problem/target_region_test.cpp
           unit/register/problem/multi_view_objective_test.cpp unit/register/method/correction_test.cpp
+          unit/register/search/edge_image_test.cpp unit/register/search/pose_search_test.cpp
+          unit/register/search/rotation_set_test.cpp
           unit/register/verdict/registration_test.cpp unit/register/verdict/target_examiner_test.cpp
           unit/register/verdict/verdict_test.cpp
           unit/register/verdict/pose_covariance_test.cpp unit/register/verdict/uncertainty_estimator_test.cpp
-  LIBS af_register_verdict af_geometry af_files)
+  LIBS af_register_search af_register_verdict af_geometry af_files)
 af_add_test(
   register_program_unit_tests
   SOURCES unit/register/register_options_test.cpp unit/register/kept_fields_test.cpp

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "register/search/edge_image.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+#include "base/vector_width.h"
+#include "register/search/edge_correlation_kernel.h"
+
+namespace af::registration {
+namespace {
+
+/// The root mean square of edges that are not 0, in steps: five times as strong an edge is still
+/// told apart from a stronger one.
+constexpr float kRmsSteps = 51.0f;
+
+bool is_used(std::span<const std::uint8_t> used, std::size_t pixel) {
+  return used.empty() || used[pixel] != 0;
+}
+
+/// g / sqrt|g| along columns and rows of every pixel.
+std::vector<float> compressed_gradients(const Image2d& image, std::span<const std::uint8_t> used) {
+  std::vector<float> edges(2 * image.pixels.size(), 0.0f);
+  const auto stride = static_cast<std::size_t>(image.width);
+  for (int row = 1; row + 1 < image.height; ++row)
+    for (int column = 1; column + 1 < image.width; ++column) {
+      const std::size_t at =
+          static_cast<std::size_t>(row) * stride + static_cast<std::size_t>(column);
+      if (!is_used(used, at - 1) || !is_used(used, at + 1) || !is_used(used, at - stride) ||
+          !is_used(used, at + stride))
+        continue;
+      const float x = image.pixels[at + 1] - image.pixels[at - 1];
+      const float y = image.pixels[at + stride] - image.pixels[at - stride];
+      const float size = std::hypot(x, y);
+      if (!(size > 0.0f) || !std::isfinite(size)) continue;
+      edges[2 * at] = x / std::sqrt(size);
+      edges[2 * at + 1] = y / std::sqrt(size);
+    }
+  return edges;
+}
+
+/// Steps per unit of an edge.
+float steps_per_unit(const std::vector<float>& edges) {
+  double sum = 0.0;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < edges.size(); i += 2) {
+    const double square = static_cast<double>(edges[i]) * static_cast<double>(edges[i]) +
+                          static_cast<double>(edges[i + 1]) * static_cast<double>(edges[i + 1]);
+    sum += square;
+    count += square > 0.0 ? 1 : 0;
+  }
+  return count == 0 ? 0.0f
+                    : kRmsSteps / static_cast<float>(std::sqrt(sum / static_cast<double>(count)));
+}
+
+std::int16_t rounded(float steps) {
+  constexpr auto kMost = static_cast<float>(EdgeImage::kLargestEdge);
+  return static_cast<std::int16_t>(std::lround(std::clamp(steps, -kMost, kMost)));
+}
+
+}  // namespace
+
+EdgeImage::EdgeImage(const Image2d& image, std::span<const std::uint8_t> used, int border)
+    : width_(image.width + 2 * border), height_(image.height + 2 * border), border_(border) {
+  const std::vector<float> gradients = compressed_gradients(image, used);
+  const float steps = steps_per_unit(gradients);
+  const auto width = static_cast<std::size_t>(width_);
+  const auto height = static_cast<std::size_t>(height_);
+  const auto added = static_cast<std::size_t>(border);
+  edges_.assign(2 * width * height, 0);
+  const std::size_t numbers = 2 * static_cast<std::size_t>(image.width);
+  for (std::size_t row = 0; row < static_cast<std::size_t>(image.height); ++row)
+    for (std::size_t i = 0; i < numbers; ++i)
+      edges_[2 * ((row + added) * width + added) + i] =
+          rounded(steps * gradients[row * numbers + i]);
+
+  energy_sums_.assign((width + 1) * (height + 1), 0);
+  for (std::size_t row = 0; row < height; ++row)
+    for (std::size_t column = 0; column < width; ++column) {
+      const std::int64_t x = edges_[2 * (row * width + column)];
+      const std::int64_t y = edges_[2 * (row * width + column) + 1];
+      const std::size_t at = (row + 1) * (width + 1) + column + 1;
+      energy_sums_[at] = x * x + y * y + energy_sums_[at - 1] + energy_sums_[at - width - 1] -
+                         energy_sums_[at - width - 2];
+    }
+}
+
+double EdgeImage::mean_energy() const {
+  const double pixels = static_cast<double>(width_ - 2 * border_) * (height_ - 2 * border_);
+  return pixels > 0.0 ? static_cast<double>(energy(0, 0, width_, height_)) / pixels : 0.0;
+}
+
+std::int64_t EdgeImage::energy(int column, int row, int width, int height) const {
+  const auto sum_to = [&](int c, int r) {
+    return energy_sums_[static_cast<std::size_t>(r) * static_cast<std::size_t>(width_ + 1) +
+                        static_cast<std::size_t>(c)];
+  };
+  return sum_to(column + width, row + height) - sum_to(column, row + height) -
+         sum_to(column + width, row) + sum_to(column, row);
+}
+
+void correlate(const EdgeImage& pattern,
+               const EdgeImage& image,
+               int first_column,
+               int first_row,
+               int columns,
+               int rows,
+               std::span<float> likeness) {
+  const int width = pattern.width();
+  const int height = pattern.height();
+  check(first_column >= 0 && first_row >= 0 &&
+            first_column + columns + width - 1 <= image.width() &&
+            first_row + rows + height - 1 <= image.height(),
+        "a pattern must stay within the image");
+  std::vector<std::int32_t> products(likeness.size());
+  const auto kernel = select_kernel<CorrelateEdges>(
+      kernels_128::correlate_edges, kernels_256::correlate_edges, kernels_512::correlate_edges);
+  kernel(
+      {pattern.edges(), width},
+      {image.edges() + 2 * (static_cast<std::ptrdiff_t>(first_row) * image.width() + first_column),
+       image.width()},
+      {width, height, columns, rows},
+      products.data());
+
+  constexpr double kLeastShare = 0.25;
+  const double of_pattern = static_cast<double>(pattern.energy(0, 0, width, height));
+  const double floor = kLeastShare * image.mean_energy() * width * height;
+  for (int row = 0; row < rows; ++row)
+    for (int column = 0; column < columns; ++column) {
+      const auto i = static_cast<std::size_t>(row * columns + column);
+      const double here =
+          static_cast<double>(image.energy(first_column + column, first_row + row, width, height));
+      const double both = of_pattern * std::max(here, floor);
+      likeness[i] = both > 0.0
+                        ? static_cast<float>(static_cast<double>(products[i]) / std::sqrt(both))
+                        : 0.0f;
+    }
+}
+
+}  // namespace af::registration

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "xray/image2d.h"
+
+namespace af::registration {
+
+/// Where an image changes, and which way: its gradient g as g / sqrt|g|, so that a few strong edges
+/// do not outweigh all others, rounded to kLargestEdge steps. Correlations of such images are
+/// sums of integers: exact, and the same in any order.
+class EdgeImage {
+ public:
+  /// Kept so small that sums over 8000 pixels fit into 32 bits.
+  static constexpr int kLargestEdge = 255;
+  static constexpr std::size_t kMostPixels = 8000;
+
+  EdgeImage() = default;
+  /// Edges are 0 where the gradient would look at a pixel that is not used (`used`: one per pixel,
+  /// 0: not used; empty: all are), and outside. `border`: pixels of zeros to add on every side.
+  EdgeImage(const Image2d& image, std::span<const std::uint8_t> used, int border);
+
+  [[nodiscard]] int width() const { return width_; }    ///< the border included
+  [[nodiscard]] int height() const { return height_; }  ///< likewise
+  /// Along columns and rows, pixel by pixel.
+  [[nodiscard]] const std::int16_t* edges() const { return edges_.data(); }
+  /// Mean of squares over the pixels within the border.
+  [[nodiscard]] double mean_energy() const;
+  /// Sum of squares over the rectangle whose first pixel is (column, row).
+  [[nodiscard]] std::int64_t energy(int column, int row, int width, int height) const;
+
+ private:
+  int width_ = 0;
+  int height_ = 0;
+  int border_ = 0;
+  std::vector<std::int16_t> edges_;
+  std::vector<std::int64_t> energy_sums_;  ///< over all pixels above and to the left
+};
+
+/// How alike a pattern is to an image where it lies on it at every shift of a rectangle: scalar
+/// products over the roots of both energies, from -1 to 1, row by row. Where the image shows less
+/// than a quarter of its mean energy, that quarter counts instead, so that the chance likeness of a
+/// few edges does not win. `first_column`, `first_row`: of the image, where the pattern's first
+/// pixel lies at the first shift; the pattern stays within the image.
+/// \test EdgeCorrelation.FindsAPatternWhereItWasCutOut
+void correlate(const EdgeImage& pattern,
+               const EdgeImage& image,
+               int first_column,
+               int first_row,
+               int columns,
+               int rows,
+               std::span<float> likeness);
+
+}  // namespace af::registration

@@ -1,0 +1,568 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "register/search/pose_search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <numbers>
+#include <span>
+#include <utility>
+
+#include "base/error.h"
+#include "geometry/tre.h"
+#include "register/method/prepared_stage.h"
+#include "register/search/edge_image.h"
+#include "register/search/rotation_set.h"
+
+namespace af::registration {
+namespace {
+
+/// Coarse pixels across the longer side of what is compared; DRRs of more tell no more about where
+/// anatomy lies at the steps of this search.
+constexpr int kPixelsAcross = 64;
+/// Of the first look at all rotations, of which there are eight times fewer at twice the step.
+constexpr int kFirstPixelsAcross = 32;
+/// Modes of the first look that are looked at again, from nearby rotations.
+constexpr std::size_t kFirstModes = 8;
+/// Smallest coarse pixel, mm on the isocentre plane: registrations find the rest.
+constexpr double kLeastPixelMm = 2.0;
+/// How far, in coarse pixels, points at the middle distance from the centre may move between
+/// neighbouring rotations. An edge that lies a pixel aside still overlaps, because edges are two to
+/// three pixels wide.
+constexpr double kPixelsPerRotation = 4.0;
+/// Range without fields and without a stated one.
+constexpr double kUsualRotationRad = 20.0 * kRadPerDeg;
+constexpr double kUsualTranslationMm = 40.0;
+/// Maxima of one rotation that are kept: more only repeat each other.
+constexpr std::size_t kMaximaPerRotation = 8;
+/// Modes lie at least this far from each other, mean over the target box: registrations that start
+/// nearer end at the same pose.
+constexpr double kModesApartMm = 20.0;
+
+/// What both ranges hold.
+MotionRange common_part(const MotionRange& a, const MotionRange& b) {
+  return {{a.low.rotation_rad.cwiseMax(b.low.rotation_rad),
+           a.low.translation_mm.cwiseMax(b.low.translation_mm)},
+          {a.high.rotation_rad.cwiseMin(b.high.rotation_rad),
+           a.high.translation_mm.cwiseMin(b.high.translation_mm)}};
+}
+
+/// Where all fields hold poses, relative to the first one's frame; none without fields.
+std::optional<MotionLimit> reach_of_fields(const RegistrationProblem& problem) {
+  std::optional<MotionLimit> reach;
+  for (const RegistrationView& view : problem.views) {
+    if (!view.reach.has_value()) continue;
+    if (reach.has_value())
+      reach->range = common_part(reach->range, view.reach->range);
+    else
+      reach = view.reach;
+  }
+  return reach;
+}
+
+void replace(const std::optional<std::array<double, 3>>& values,
+             double unit,
+             Eigen::Vector3d& low,
+             Eigen::Vector3d& high) {
+  if (!values.has_value()) return;
+  high = unit * Eigen::Vector3d((*values)[0], (*values)[1], (*values)[2]);
+  low = -high;
+}
+
+MotionLimit searched_range(const RegistrationProblem& problem, const PoseSearchOptions& options) {
+  const std::optional<MotionLimit> of_fields = reach_of_fields(problem);
+  MotionLimit searched = of_fields.value_or(
+      MotionLimit{problem.frame(), MotionRange(kUsualRotationRad, kUsualTranslationMm)});
+  MotionRange& range = searched.range;
+  replace(options.rotation_deg, kRadPerDeg, range.low.rotation_rad, range.high.rotation_rad);
+  replace(options.translation_mm, 1.0, range.low.translation_mm, range.high.translation_mm);
+  if (of_fields.has_value() &&
+      (options.orientations != "field" || !of_fields->range.contains(range.low) ||
+       !of_fields->range.contains(range.high)))
+    throw InputError("--search-orientations, --search-rotation-deg, --search-translation-mm",
+                     options.orientations + ", " + range.text(),
+                     "must stay within the fields, " + of_fields->range.text() +
+                         "; --renderer raycast searches everywhere");
+  return searched;
+}
+
+/// Rotations from ct to room. `step_rad`: between neighbours.
+std::vector<Eigen::Matrix3d> searched_rotations(const PoseSearchOptions& options,
+                                                const MotionLimit& searched,
+                                                double step_rad) {
+  const Eigen::Matrix3d& nominal = searched.frame.rotation;
+  std::vector<Eigen::Matrix3d> turned{nominal};
+  if (options.orientations == "flips") {
+    turned.clear();
+    for (const Eigen::Matrix3d& turn : half_turns()) turned.emplace_back(nominal * turn);
+  }
+  const std::vector<Eigen::Matrix3d> moved = options.orientations == "any"
+                                                 ? all_rotations(step_rad)
+                                                 : rotations_of_range(searched.range, step_rad);
+  std::vector<Eigen::Matrix3d> rotations;
+  for (const Eigen::Matrix3d& from : turned)
+    for (const Eigen::Matrix3d& by : moved) rotations.emplace_back(by * from);
+  return rotations;
+}
+
+/// A pose's own rotation and those that differ by a step about some of the axes.
+void add_rotations_about(const RigidTransform& room_from_ct,
+                         double step_rad,
+                         std::vector<Eigen::Matrix3d>& rotations) {
+  for (const double x : {-step_rad, 0.0, step_rad})
+    for (const double y : {-step_rad, 0.0, step_rad})
+      for (const double z : {-step_rad, 0.0, step_rad})
+        rotations.emplace_back(rotation_from_angles({x, y, z}) * room_from_ct.linear());
+}
+
+/// A view's renderer whose blur is the largest below a coarse pixel.
+struct CoarseRenderer {
+  std::shared_ptr<const DrrRenderer> renderer;
+  double blur_sigma_mm = 0.0;
+};
+
+CoarseRenderer coarse_renderer(const RegistrationView& view, double pixel_mm) {
+  CoarseRenderer chosen{view.renderer, 0.0};
+  for (const RendererLevel& level : view.coarse_levels)
+    if (level.blur_sigma_mm <= pixel_mm) chosen = {level.renderer, level.blur_sigma_mm};
+  return chosen;
+}
+
+/// Numbers first, first + step, ... up to last, at least one.
+struct Steps {
+  double first = 0.0;
+  double step = 0.0;
+  int count = 1;
+
+  Steps(double low, double high, double widest)
+      : count(1 + static_cast<int>(std::ceil((high - low) / widest - 1e-9))) {
+    step = count > 1 ? (high - low) / (count - 1) : 0.0;
+    first = count > 1 ? low : 0.5 * (low + high);
+  }
+  [[nodiscard]] double at(int i) const { return first + i * step; }
+};
+
+/// The lattice of translations.
+struct Lattice {
+  std::array<Steps, 3> axes;
+
+  Lattice(const MotionRange& range, double step_mm)
+      : axes{Steps(range.low.translation_mm.x(), range.high.translation_mm.x(), step_mm),
+             Steps(range.low.translation_mm.y(), range.high.translation_mm.y(), step_mm),
+             Steps(range.low.translation_mm.z(), range.high.translation_mm.z(), step_mm)} {}
+
+  [[nodiscard]] std::size_t size() const {
+    return static_cast<std::size_t>(axes[0].count) * static_cast<std::size_t>(axes[1].count) *
+           static_cast<std::size_t>(axes[2].count);
+  }
+  /// z is slowest.
+  [[nodiscard]] std::array<int, 3> node(std::size_t index) const {
+    const auto nx = static_cast<std::size_t>(axes[0].count);
+    const auto ny = static_cast<std::size_t>(axes[1].count);
+    return {static_cast<int>(index % nx),
+            static_cast<int>(index / nx % ny),
+            static_cast<int>(index / (nx * ny))};
+  }
+  [[nodiscard]] Eigen::Vector3d translation(std::size_t index) const {
+    const std::array<int, 3> at = node(index);
+    return {axes[0].at(at[0]), axes[1].at(at[1]), axes[2].at(at[2])};
+  }
+  /// Whether no neighbour along an axis has a larger value.
+  [[nodiscard]] bool is_maximum(std::span<const float> values, std::size_t index) const {
+    const std::array<int, 3> at = node(index);
+    std::size_t stride = 1;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (at[axis] > 0 && values[index - stride] > values[index]) return false;
+      if (at[axis] + 1 < axes[axis].count && values[index + stride] > values[index]) return false;
+      stride *= static_cast<std::size_t>(axes[axis].count);
+    }
+    return true;
+  }
+};
+
+/// Where a translation is seen: which correlations, and where in them.
+struct Place {
+  int layer = 0;
+  std::uint32_t pixel = 0;  ///< left and above of it
+  float right = 0.0f;       ///< from there, in coarse pixels
+  float below = 0.0f;
+};
+
+/// One view of the search.
+struct SearchedView {
+  View pattern;  ///< coarse: what a DRR shows
+  std::shared_ptr<const DrrRenderer> renderer;
+  EdgeImage xray;
+  Eigen::Vector3d along_beam;  ///< room: unit, from the source to the nominal centre
+  Steps depths{0.0, 0.0, 1.0};
+  int first_column = 0;  ///< of the first shift, in `xray`
+  int first_row = 0;
+  int columns = 1;  ///< shifts
+  int rows = 1;
+  std::vector<Place> places;  ///< of the lattice's translations
+
+  [[nodiscard]] std::size_t shifts() const {
+    return static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
+  }
+};
+
+/// Coarse pixels of about so many across, mm on the isocentre plane: the same in all views, as the
+/// widest needs them.
+double pixel_mm_of(const RegistrationProblem& problem, int pixels_across) {
+  double pixel_mm = kLeastPixelMm;
+  for (const RegistrationView& view : problem.views) {
+    const RegionOfInterest roi = view.widest_view().roi;
+    const double mm =
+        std::max(roi.width, roi.height) / view.view.camera.pixels_per_mm(problem.isocenter_point);
+    pixel_mm = std::max(pixel_mm, mm / pixels_across);
+  }
+  return pixel_mm;
+}
+
+View coarse_whole(const CameraGeometry& camera, const StageGrid& grid) {
+  return stage_view(View::whole_detector(camera), grid);
+}
+
+/// Where, in coarse pixels of the X-ray, the pattern's first pixel lies when the centre is seen
+/// where a translation puts it.
+Eigen::Vector2d shift_of(const View& pattern,
+                         const View& whole,
+                         const Eigen::Vector3d& nominal_center,
+                         const Eigen::Vector3d& translation) {
+  return whole.camera.project(nominal_center + translation) -
+         pattern.camera.project(nominal_center);
+}
+
+double depth_of(const SearchedView& view, const Eigen::Vector3d& translation) {
+  return view.along_beam.dot(translation);
+}
+
+int nearest_layer(const Steps& depths, double depth) {
+  if (depths.count == 1) return 0;
+  const double place = (depth - depths.first) / depths.step;
+  return static_cast<int>(std::lround(std::clamp(place, 0.0, depths.count - 1.0)));
+}
+
+/// Everything that does not depend on the rotation. `center`: room, at zero parameters.
+SearchedView searched_view(const RegistrationProblem& problem,
+                           const Eigen::Vector3d& center,
+                           const RegistrationView& view,
+                           const Lattice& lattice,
+                           int pixel_step,
+                           double pixel_mm) {
+  const CoarseRenderer coarse = coarse_renderer(view, pixel_mm);
+  const CameraGeometry& camera = view.view.camera;
+  const double blur_px = coarse.blur_sigma_mm * camera.pixels_per_mm(problem.isocenter_point);
+  const StageGrid grid{pixel_step, 1.0, blur_px};
+  const View whole = coarse_whole(camera, grid);
+  SearchedView searched{.pattern = stage_view(view.widest_view(), grid),
+                        .renderer = coarse.renderer,
+                        .xray = {},
+                        .along_beam = {},
+                        .places = {}};
+  searched.along_beam = (center - camera.source_point).normalized();
+
+  const std::size_t count = lattice.size();
+  std::vector<Eigen::Vector2d> shifts(count);
+  Eigen::Vector2d low = Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity());
+  Eigen::Vector2d high = -low;
+  double nearest = std::numeric_limits<double>::infinity();
+  double farthest = -nearest;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Eigen::Vector3d translation = lattice.translation(i);
+    shifts[i] = shift_of(searched.pattern, whole, center, translation);
+    low = low.cwiseMin(shifts[i]);
+    high = high.cwiseMax(shifts[i]);
+    nearest = std::min(nearest, depth_of(searched, translation));
+    farthest = std::max(farthest, depth_of(searched, translation));
+  }
+  const Eigen::Vector2i first = low.array().floor().cast<int>();
+  const Eigen::Vector2i last = high.array().floor().cast<int>() + 1;
+  searched.columns = last.x() - first.x() + 1;
+  searched.rows = last.y() - first.y() + 1;
+  const int width = searched.pattern.roi.width;
+  const int height = searched.pattern.roi.height;
+  const int border = std::max({0,
+                               -first.x(),
+                               -first.y(),
+                               last.x() + width - whole.roi.width,
+                               last.y() + height - whole.roi.height});
+  searched.first_column = first.x() + border;
+  searched.first_row = first.y() + border;
+  const SimilarityReference seen =
+      stage_reference(view.xray, view.mask, View::whole_detector(camera), grid);
+  searched.xray = EdgeImage(seen.xray, seen.used, border);
+  if (!(searched.xray.mean_energy() > 0.0))
+    throw InputError(view_name(view) + "X-ray", "no edges", "a search needs an image of something");
+
+  // At half the pattern's width from its middle, sizes change by a pixel over this depth.
+  const double half_mm = 0.5 * pixel_mm * std::max(width, height);
+  const double layer_mm = 2.0 * pixel_mm * (center - camera.source_point).norm() / half_mm;
+  const int layers = std::max(1, static_cast<int>(std::ceil((farthest - nearest) / layer_mm)));
+  const double thickness = (farthest - nearest) / layers;
+  searched.depths =
+      Steps(nearest + 0.5 * thickness, farthest - 0.5 * thickness, std::max(thickness, 1e-3));
+
+  searched.places.resize(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const Eigen::Vector2d at = shifts[i] - first.cast<double>();
+    const Eigen::Vector2d corner = at.array().floor();
+    searched.places[i] = {
+        nearest_layer(searched.depths, depth_of(searched, lattice.translation(i))),
+        static_cast<std::uint32_t>(corner.y()) * static_cast<std::uint32_t>(searched.columns) +
+            static_cast<std::uint32_t>(corner.x()),
+        static_cast<float>(at.x() - corner.x()),
+        static_cast<float>(at.y() - corner.y())};
+  }
+  return searched;
+}
+
+/// A place of the search that no neighbour beats.
+struct Maximum {
+  float likeness = 0.0f;
+  std::uint32_t rotation = 0;
+  std::uint32_t translation = 0;
+
+  /// The likelier first; equal ones by their place, so that the order is always the same.
+  [[nodiscard]] bool is_before(const Maximum& other) const {
+    if (likeness != other.likeness) return likeness > other.likeness;
+    return std::pair(rotation, translation) < std::pair(other.rotation, other.translation);
+  }
+};
+
+/// Scratch memory of one thread.
+struct Scratch {
+  std::vector<std::unique_ptr<RenderWorkspace>> workspaces;  ///< of the views
+  Image2d drr;
+  std::vector<float> likeness;  ///< of one view, layer after layer
+  std::vector<float> sums;      ///< over the views, at every translation
+};
+
+/// A search at one size of pixels, over any rotations.
+struct Looking {
+  const RegistrationProblem& problem;
+  PoseFrame frame;  ///< of the searched range
+  double rotation_step_rad;
+  Lattice lattice;
+  std::vector<SearchedView> views;
+
+  Looking(const RegistrationProblem& registered, const MotionLimit& searched, int pixels_across);
+
+  [[nodiscard]] RigidTransform pose(const Eigen::Matrix3d& rotation,
+                                    const Eigen::Vector3d& translation) const {
+    PoseFrame moved = frame;
+    moved.rotation = rotation;
+    moved.center_room_mm += translation;
+    return moved.nominal_room_from_ct();
+  }
+  /// Adds how alike a view is at every translation.
+  void add_view(std::size_t view, const Eigen::Matrix3d& rotation, Scratch& scratch) const;
+  /// The best maxima of one rotation, whose index they get.
+  [[nodiscard]] std::vector<Maximum> maxima(const Eigen::Matrix3d& rotation,
+                                            std::size_t index,
+                                            Scratch& scratch) const;
+  /// The likeliest poses with one of these rotations, at most `count`, apart from each other.
+  [[nodiscard]] std::vector<PoseMode> modes(const std::vector<Eigen::Matrix3d>& rotations,
+                                            std::size_t count,
+                                            ThreadPool& threads) const;
+};
+
+Looking::Looking(const RegistrationProblem& registered,
+                 const MotionLimit& searched,
+                 int pixels_across)
+    : problem(registered),
+      frame(searched.frame),
+      rotation_step_rad(kPixelsPerRotation * 2.0 * std::numbers::sqrt2 / pixels_across),
+      lattice(searched.range, pixel_mm_of(registered, pixels_across)) {
+  const double pixel_mm = pixel_mm_of(registered, pixels_across);
+  for (const RegistrationView& view : problem.views) {
+    const double pixels_per_mm = view.view.camera.pixels_per_mm(problem.isocenter_point);
+    const int step = std::max(1, static_cast<int>(std::lround(pixel_mm * pixels_per_mm)));
+    views.push_back(
+        searched_view(problem, frame.center_room_mm, view, lattice, step, step / pixels_per_mm));
+  }
+}
+
+void Looking::add_view(std::size_t view, const Eigen::Matrix3d& rotation, Scratch& scratch) const {
+  const SearchedView& seen = views[view];
+  const std::size_t shifts = seen.shifts();
+  scratch.likeness.resize(shifts * static_cast<std::size_t>(seen.depths.count));
+  scratch.drr.width = seen.pattern.roi.width;
+  scratch.drr.height = seen.pattern.roi.height;
+  scratch.drr.pixels.resize(seen.pattern.pixel_count());
+  for (int layer = 0; layer < seen.depths.count; ++layer) {
+    seen.renderer->render(pose(rotation, seen.depths.at(layer) * seen.along_beam),
+                          seen.pattern,
+                          *scratch.workspaces[view],
+                          scratch.drr.pixels);
+    correlate(
+        EdgeImage(scratch.drr, {}, 0),
+        seen.xray,
+        seen.first_column,
+        seen.first_row,
+        seen.columns,
+        seen.rows,
+        std::span(scratch.likeness).subspan(static_cast<std::size_t>(layer) * shifts, shifts));
+  }
+  const auto columns = static_cast<std::size_t>(seen.columns);
+  for (std::size_t i = 0; i < scratch.sums.size(); ++i) {
+    const Place& place = seen.places[i];
+    const float* const at =
+        scratch.likeness.data() + static_cast<std::size_t>(place.layer) * shifts + place.pixel;
+    const float above = at[0] + place.right * (at[1] - at[0]);
+    const float under = at[columns] + place.right * (at[columns + 1] - at[columns]);
+    scratch.sums[i] += above + place.below * (under - above);
+  }
+}
+
+std::vector<Maximum> Looking::maxima(const Eigen::Matrix3d& rotation,
+                                     std::size_t index,
+                                     Scratch& scratch) const {
+  if (scratch.workspaces.empty())
+    for (const SearchedView& view : views)
+      scratch.workspaces.push_back(view.renderer->make_workspace());
+  scratch.sums.assign(lattice.size(), 0.0f);
+  for (std::size_t view = 0; view < views.size(); ++view) add_view(view, rotation, scratch);
+  std::vector<Maximum> found;
+  for (std::size_t i = 0; i < scratch.sums.size(); ++i)
+    if (lattice.is_maximum(scratch.sums, i))
+      found.push_back({scratch.sums[i] / static_cast<float>(views.size()),
+                       static_cast<std::uint32_t>(index),
+                       static_cast<std::uint32_t>(i)});
+  const std::size_t kept = std::min(found.size(), kMaximaPerRotation);
+  std::partial_sort(found.begin(),
+                    found.begin() + static_cast<std::ptrdiff_t>(kept),
+                    found.end(),
+                    [](const Maximum& a, const Maximum& b) { return a.is_before(b); });
+  found.resize(kept);
+  return found;
+}
+
+std::vector<PoseMode> Looking::modes(const std::vector<Eigen::Matrix3d>& rotations,
+                                     std::size_t count,
+                                     ThreadPool& threads) const {
+  std::vector<std::vector<Maximum>> of_rotations(rotations.size());
+  std::vector<Scratch> scratch(static_cast<std::size_t>(threads.threads()));
+  threads.for_each(static_cast<int>(rotations.size()), [&](int rotation, int slot) {
+    const auto i = static_cast<std::size_t>(rotation);
+    of_rotations[i] = maxima(rotations[i], i, scratch[static_cast<std::size_t>(slot)]);
+  });
+  std::vector<Maximum> all;
+  for (const std::vector<Maximum>& found : of_rotations)
+    all.insert(all.end(), found.begin(), found.end());
+  std::sort(
+      all.begin(), all.end(), [](const Maximum& a, const Maximum& b) { return a.is_before(b); });
+
+  const std::vector<Eigen::Vector3d>& points =
+      problem.target_points_ct.empty() ? problem.scaling_points_ct : problem.target_points_ct;
+  std::vector<PoseMode> found;
+  for (const Maximum& maximum : all) {
+    if (found.size() == count) break;
+    const RigidTransform here =
+        pose(rotations[maximum.rotation], lattice.translation(maximum.translation));
+    const bool is_apart = std::all_of(found.begin(), found.end(), [&](const PoseMode& likelier) {
+      return mean_tre_mm(here, likelier.room_from_ct, points) >= kModesApartMm;
+    });
+    if (is_apart) found.push_back({here, static_cast<double>(maximum.likeness)});
+  }
+  return found;
+}
+
+}  // namespace
+
+struct PoseSearch::Parts {
+  PoseSearchOptions options;
+  std::shared_ptr<ThreadPool> threads;
+  MotionLimit searched;
+  std::optional<Looking> first;  ///< with a first look at all rotations
+  Looking looking;
+  std::vector<Eigen::Matrix3d> rotations;  ///< of the first look, if there is one
+};
+
+void PoseSearchOptions::describe(Fields& field) {
+  field("search_modes",
+        modes,
+        "--start search: so many of the likeliest poses are registered; the best end wins")
+      .at_least(1)
+      .at_most(100);
+  field("search_orientations",
+        orientations,
+        "--start search: 'field' looks at rotations of the fields' range (without fields +-20 "
+        "degrees); 'flips' also at the patient turned by 180 degrees about each axis; 'any' at all "
+        "rotations. The last two need --renderer raycast")
+      .choice({"field", "flips", "any"});
+  field("search_rotation_deg",
+        rotation_deg,
+        "--start search: rx,ry,rz farthest from nominal, degrees (default: the fields' range)");
+  field("search_translation_mm",
+        translation_mm,
+        "--start search: tx,ty,tz farthest from nominal, mm (default: the fields' range, without "
+        "fields 40 mm)");
+}
+
+std::vector<std::string> problems(const PoseSearchOptions& options) {
+  std::vector<std::string> found;
+  const auto check_each =
+      [&](const std::optional<std::array<double, 3>>& values, const char* name, double most) {
+        if (!values.has_value()) return;
+        for (const double value : *values)
+          if (!(value >= 0.0 && value <= most))
+            found.push_back(std::string(name) + " = " + std::to_string(value) +
+                            ": must be from 0 to " + std::to_string(static_cast<int>(most)));
+      };
+  check_each(options.rotation_deg, "--search-rotation-deg", 180.0);
+  check_each(options.translation_mm, "--search-translation-mm", 1000.0);
+  if (options.orientations == "any" && options.rotation_deg.has_value())
+    found.emplace_back(
+        "--search-rotation-deg = set: must be left out with --search-orientations any");
+  return found;
+}
+
+int coarsest_level(const PoseSearchOptions& options) {
+  return options.orientations == "any" ? kCoarsestLevel : 0;
+}
+
+PoseSearch::PoseSearch(const RegistrationProblem& problem,
+                       const PoseSearchOptions& options,
+                       std::shared_ptr<ThreadPool> threads) {
+  throw_if_any(problems(options));
+  const MotionLimit searched = searched_range(problem, options);
+  const bool is_everywhere = options.orientations == "any";
+  std::optional<Looking> first;
+  if (is_everywhere) first.emplace(problem, searched, kFirstPixelsAcross);
+  Looking looking(problem, searched, kPixelsAcross);
+  const double step_rad = is_everywhere ? first->rotation_step_rad : looking.rotation_step_rad;
+  parts_ =
+      std::make_unique<Parts>(Parts{options,
+                                    threads ? std::move(threads) : std::make_shared<ThreadPool>(),
+                                    searched,
+                                    std::move(first),
+                                    std::move(looking),
+                                    searched_rotations(options, searched, step_rad)});
+}
+
+PoseSearch::~PoseSearch() = default;
+PoseSearch::PoseSearch(PoseSearch&&) noexcept = default;
+PoseSearch& PoseSearch::operator=(PoseSearch&&) noexcept = default;
+
+const MotionRange& PoseSearch::range() const {
+  return parts_->searched.range;
+}
+
+std::size_t PoseSearch::rotation_count() const {
+  return parts_->rotations.size();
+}
+
+std::vector<PoseMode> PoseSearch::modes() const {
+  const auto count = static_cast<std::size_t>(parts_->options.modes);
+  ThreadPool& threads = *parts_->threads;
+  if (!parts_->first.has_value()) return parts_->looking.modes(parts_->rotations, count, threads);
+  std::vector<Eigen::Matrix3d> rotations;
+  for (const PoseMode& mode :
+       parts_->first->modes(parts_->rotations, std::max(count, kFirstModes), threads))
+    add_rotations_about(mode.room_from_ct, parts_->looking.rotation_step_rad, rotations);
+  return parts_->looking.modes(rotations, count, threads);
+}
+
+}  // namespace af::registration

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where a registration starts when nobody knows where the patient lies.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/described_fields.h"
+#include "base/thread_pool.h"
+#include "geometry/motion_range.h"
+#include "geometry/rigid_transform.h"
+#include "register/problem/registration_problem.h"
+
+namespace af::registration {
+
+struct PoseSearchOptions {
+  int modes = 5;
+  std::string orientations = "field";  ///< or "flips" or "any"
+  /// Farthest from nominal about and along each axis; none: as far as the fields reach.
+  std::optional<std::array<double, 3>> rotation_deg;
+  std::optional<std::array<double, 3>> translation_mm;
+
+  void describe(Fields& field);
+};
+
+std::vector<std::string> problems(const PoseSearchOptions& options);
+
+/// Of the image pyramids: the level whose blur suits the first look at all rotations; 0 without.
+int coarsest_level(const PoseSearchOptions& options);
+
+/// A pose at which DRRs are like the X-rays, and how much: the mean over views of a correlation,
+/// at most 1.
+struct PoseMode {
+  RigidTransform room_from_ct = RigidTransform::Identity();
+  double likeness = 0.0;
+};
+
+/// Looks for poses everywhere in a range at once. For every rotation of a set, one coarse DRR of
+/// each view is correlated with its X-ray at all shifts; the correlations of all views are added on
+/// one lattice of translations, so that the views triangulate without a choice among their peaks.
+/// DRRs are made anew for depths along the beam at which they would be seen a pixel larger. The
+/// steps of rotations and translations follow from the coarse pixels. Registrations reach several
+/// steps far, so the search need not be exact. Depends on the problem and the options alone, not on
+/// threads or vector width. \test PoseSearch.FindsAPoseAnywhereInItsRange
+class PoseSearch {
+ public:
+  /// The problem must outlive it. InputError where the options ask for poses that a view's field
+  /// does not hold, or an X-ray shows nothing.
+  PoseSearch(const RegistrationProblem& problem,
+             const PoseSearchOptions& options,
+             std::shared_ptr<ThreadPool> threads = nullptr);
+  ~PoseSearch();
+  PoseSearch(PoseSearch&&) noexcept;
+  PoseSearch& operator=(PoseSearch&&) noexcept;
+
+  /// At most PoseSearchOptions::modes, the likeliest first, each farther from every likelier one
+  /// than registrations usually reach.
+  [[nodiscard]] std::vector<PoseMode> modes() const;
+
+  /// What was asked for, relative to the fields' nominal pose or, without fields, to the study's.
+  [[nodiscard]] const MotionRange& range() const;
+  [[nodiscard]] std::size_t rotation_count() const;
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace af::registration

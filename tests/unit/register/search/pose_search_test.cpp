@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "register/search/pose_search.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "base/hash_random.h"
+#include "base/vector_width.h"
+#include "geometry/tre.h"
+#include "unit/register/method/registration_cases.h"
+
+namespace af::registration {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// X-rays of the small case at another pose.
+test::SmallCase small_case_at(const PoseParameters& parameters) {
+  test::SmallCase small = test::small_case(test::bones_in_a_corner());
+  small.gold_room_from_ct = pose_from_parameters(small.problem->frame(), parameters);
+  for (RegistrationView& view : small.problem->views)
+    view.xray = render_image(
+        *view.renderer, small.gold_room_from_ct, View::whole_detector(view.view.camera));
+  return small;
+}
+
+double distance_mm(const test::SmallCase& small, const RigidTransform& pose) {
+  return mean_tre_mm(pose, small.gold_room_from_ct, small.problem->scaling_points_ct);
+}
+
+TEST(PoseSearch, FindsAPoseAnywhereInItsRange) {
+  HashRandom random(3);
+  const MotionRange range(20.0 * kRadPerDeg, 20.0);
+  PoseSearchOptions options;
+  options.translation_mm = {20.0, 20.0, 20.0};
+  for (int i = 0; i < 8; ++i) {
+    const test::SmallCase small = small_case_at(random_pose(range, random));
+    const PoseSearch search(*small.problem, options);
+    const std::vector<PoseMode> modes = search.modes();
+    ASSERT_FALSE(modes.empty());
+    // Half a step of rotations about each axis moves points of this CT, 30 mm from its middle, by
+    // up to 5 mm; half a step of the lattice adds 2 mm an axis.
+    EXPECT_LT(distance_mm(small, modes.front().room_from_ct), 8.0) << i;
+    EXPECT_GT(modes.front().likeness, 0.5) << i;
+  }
+}
+
+TEST(PoseSearch, FindsAPatientWhoLiesTheOtherWayRound) {
+  test::SmallCase small = small_case_at({});
+  const RigidTransform turned = RigidTransform(
+      Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitZ()).toRotationMatrix());
+  small.gold_room_from_ct =
+      pose_from_parameters(small.problem->frame(),
+                           PoseParameters::from_deg_and_mm({4, -6, 3, 5, -8, 6})) *
+      turned;
+  for (RegistrationView& view : small.problem->views)
+    view.xray = render_image(
+        *view.renderer, small.gold_room_from_ct, View::whole_detector(view.view.camera));
+  PoseSearchOptions options;
+  options.translation_mm = {20.0, 20.0, 20.0};
+  for (const char* orientations : {"flips", "any"}) {
+    options.orientations = orientations;
+    EXPECT_LT(distance_mm(small, PoseSearch(*small.problem, options).modes().front().room_from_ct),
+              10.0)
+        << orientations;
+  }
+  options.orientations = "field";
+  EXPECT_GT(distance_mm(small, PoseSearch(*small.problem, options).modes().front().room_from_ct),
+            20.0);
+}
+
+TEST(PoseSearch, OneViewFindsWhatItShows) {
+  test::SmallCase small = small_case_at(PoseParameters::from_deg_and_mm({-12, 7, 15, 14, -9, -11}));
+  small.problem->views.resize(1);
+  PoseSearchOptions options;
+  options.translation_mm = {20.0, 20.0, 20.0};
+  const RigidTransform found = PoseSearch(*small.problem, options).modes().front().room_from_ct;
+  // AP looks along y.
+  const Eigen::Vector3d apart =
+      (found * Eigen::Vector3d(10, 5, 10)) - (small.gold_room_from_ct * Eigen::Vector3d(10, 5, 10));
+  EXPECT_LT(std::hypot(apart.x(), apart.z()), 8.0);
+}
+
+TEST(PoseSearch, IsTheSameOnEveryVectorWidthAndNumberOfThreads) {
+  const test::SmallCase small =
+      small_case_at(PoseParameters::from_deg_and_mm({9, 8, -14, -10, 12, 3}));
+  PoseSearchOptions options;
+  options.translation_mm = {20.0, 20.0, 20.0};
+  const std::vector<PoseMode> expected = PoseSearch(*small.problem, options).modes();
+  for (const VectorWidth width : supported_vector_widths()) {
+    force_vector_width(width);
+    const PoseSearch search(*small.problem, options, std::make_shared<ThreadPool>(3));
+    const std::vector<PoseMode> modes = search.modes();
+    ASSERT_EQ(modes.size(), expected.size());
+    for (std::size_t i = 0; i < modes.size(); ++i) {
+      EXPECT_EQ(modes[i].room_from_ct.matrix(), expected[i].room_from_ct.matrix());
+      EXPECT_EQ(modes[i].likeness, expected[i].likeness);
+    }
+  }
+  force_vector_width(std::nullopt);
+}
+
+TEST(PoseSearch, ModesAreApartAndInOrder) {
+  const test::SmallCase small = small_case_at({});
+  PoseSearchOptions options;
+  options.translation_mm = {20.0, 20.0, 20.0};
+  options.modes = 4;
+  const std::vector<PoseMode> modes = PoseSearch(*small.problem, options).modes();
+  ASSERT_EQ(modes.size(), 4u);
+  for (std::size_t i = 0; i < modes.size(); ++i)
+    for (std::size_t k = 0; k < i; ++k) {
+      EXPECT_LE(modes[i].likeness, modes[k].likeness);
+      EXPECT_GE(mean_tre_mm(
+                    modes[i].room_from_ct, modes[k].room_from_ct, small.problem->scaling_points_ct),
+                20.0);
+    }
+}
+
+std::string refusal(const RegistrationProblem& problem, const PoseSearchOptions& options) {
+  try {
+    const PoseSearch search(problem, options);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "none";
+}
+
+TEST(PoseSearch, RefusesPosesThatAFieldDoesNotHold) {
+  const test::SmallCase small = small_case_at({});
+  small.problem->views[0].reach =
+      MotionLimit{small.problem->frame(), MotionRange(10.0 * kRadPerDeg, 20.0)};
+  PoseSearchOptions options;
+  EXPECT_EQ(refusal(*small.problem, options), "none");
+  options.orientations = "flips";
+  EXPECT_THAT(refusal(*small.problem, options), HasSubstr("--renderer raycast"));
+  options.orientations = "field";
+  options.rotation_deg = {12.0, 5.0, 5.0};
+  EXPECT_THAT(refusal(*small.problem, options), HasSubstr("+-10 degrees, +-20 mm"));
+}
+
+TEST(PoseSearch, RefusesAnXrayThatShowsNothing) {
+  const test::SmallCase small = small_case_at({});
+  std::ranges::fill(small.problem->views[1].xray.pixels, 1.0f);
+  EXPECT_THAT(refusal(*small.problem, {}), HasSubstr("view 'LAT'"));
+}
+
+TEST(PoseSearchOptions, NamesEverythingThatIsWrong) {
+  PoseSearchOptions options;
+  options.rotation_deg = {10.0, -1.0, 181.0};
+  options.translation_mm = {10.0, 10.0, 1001.0};
+  EXPECT_EQ(problems(options).size(), 3u);
+  options = {};
+  options.orientations = "any";
+  options.rotation_deg = {10.0, 10.0, 10.0};
+  EXPECT_EQ(problems(options).size(), 1u);
+}
+
+}  // namespace
+}  // namespace af::registration
