@@ -6,7 +6,8 @@
 namespace af {
 
 void inform(const Communicator& communicator, const std::string& message) {
-  // In one piece: mpirun forwards pieces as they come, with those of other ranks between.
+  // Written in one piece, because mpirun forwards pieces as they come, with those of other ranks
+  // between.
   if (communicator.is_root()) std::cerr << message + "\n";
 }
 

@@ -7,8 +7,8 @@
 
 namespace af {
 
-/// Information for the person at the terminal, on standard error, from rank 0 only. Results go to
-/// standard output.
+/// Informs the person at the terminal, on standard error, from rank 0 only. Results go to standard
+/// output.
 void inform(const Communicator& communicator, const std::string& message);
 void warn(const Communicator& communicator, const std::string& message);
 
