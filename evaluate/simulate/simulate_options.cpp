@@ -137,7 +137,7 @@ void append_bone_problems(const SimulateOptions& options, std::vector<std::strin
     found.push_back(unknown_name_text(bones, option, bone_of(options)));
 }
 
-/// Studies are refused whose target box breaks the rule of target_box_problem().
+/// Refuses studies whose target box breaks the rule of target_box_problem().
 void append_target_problems(const SimulateOptions& options, std::vector<std::string>& found) {
   for (const double value : options.center_ct_mm)
     if (!std::isfinite(value)) found.push_back("center_ct_mm must be finite");
@@ -228,7 +228,7 @@ void SimulateOptions::describe(Fields& field) {
   field.part(stress);
   field.start_group("Cone-beam scan (instead of a study)");
   field.part(cone_beam);
-  // Files of studies have them so.
+  // Files of studies use these names.
   field.name_like_options();
 }
 
