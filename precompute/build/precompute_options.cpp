@@ -355,7 +355,8 @@ StPlane PrecomputeOptions::st_plane_rule() const {
 }
 
 std::vector<std::string> problems(const PrecomputeOptions& options) {
-  std::vector<std::string> found = problems(options.range());  // UsageError where it is no range
+  std::vector<std::string> found =
+      problems(options.range());  // throws UsageError where it is no range
   if (!options.orbit.empty()) (void)orbit_of_text("--orbit", options.orbit);  // likewise
   append(field_problems(options), found);
   append(problems(options.codebook_options()), found);
