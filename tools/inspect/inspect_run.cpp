@@ -15,7 +15,7 @@
 namespace af {
 namespace {
 
-/// The report of each path as soon as it is known; JSON is one array.
+/// Prints the report of each path as soon as it is known. JSON is one array.
 void print(const InspectOptions& options, const std::vector<Inspection>& inspections) {
   if (!options.as_json) {
     for (const Inspection& inspection : inspections) std::cout << to_text(inspection);
@@ -93,7 +93,7 @@ void run_inspect(const InspectOptions& options, const Communicator& world) {
   if (world.is_root()) print(options, inspections);
   if (worst == ExitCode::Done) return;
   std::cout.flush();
-  // Every rank knows the same; only one says it.
+  // Every rank knows the same, but only one says it.
   throw RemoteError(worst,
                     std::to_string(bad) + " of " + std::to_string(options.paths.size()) +
                         " paths not usable; the reasons are in the report");
