@@ -44,7 +44,7 @@ def write_table(text, path):
 
 
 def draw_table(path, is_screen):
-    """NAME.md, and figures, of a table that is known by its columns."""
+    """Writes NAME.md and figures for a table, which is recognised by its columns."""
     from . import studies, tables
     from .files import columns_of
     makers = {"rotation_share_0_8_mm": tables.comparison, "smoothed_psnr_db": tables.held_out, "mb_per_camera": studies.rates,
@@ -61,7 +61,7 @@ def draw_table(path, is_screen):
 
 
 def draw_folder(folder):
-    """Figures and tables of one folder, as far as its kind has some."""
+    """Writes the figures and tables of one folder, as far as its kind has some."""
     from . import figures, population, tables
     from .files import columns_of, rows_of
     from .runs import Run, is_papers_setting, read_summary
@@ -103,7 +103,7 @@ def main():
     options = parser().parse_args()
     if (options.title or options.screen) and bool(options.title) != bool(options.output):
         parser().error("--title needs --output, and --screen must not be given with it")
-    # Importing and drawing make many objects that stay: looking for garbage among them every 700 takes a tenth of the time.
+    # Importing and drawing make many objects that stay. Looking for garbage after every 700 takes a tenth of the time.
     gc.set_threshold(100_000)
     try:
         run(options)

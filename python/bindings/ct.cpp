@@ -21,7 +21,7 @@ using namespace pybind11::literals;
 
 using Voxels = py::array_t<std::int16_t, py::array::c_style>;
 
-/// Keeps an array; the last thread that lets go of it takes the interpreter's lock first.
+/// Keeps an array. The last thread that lets go of it takes the interpreter's lock first.
 std::shared_ptr<const void> kept(const py::array& array) {
   return {new py::object(array), [](void* pointer) {
             with_lock([](void* object) { delete static_cast<py::object*>(object); }, pointer);
@@ -37,7 +37,7 @@ std::int16_t exact_hu(double value, py::ssize_t k, py::ssize_t j, py::ssize_t i)
   return static_cast<std::int16_t>(value);
 }
 
-/// An aligned int16 array in C order is taken as it is. Another one is converted slice by slice.
+/// An aligned int16 array in C order is used as it is. Any other is converted slice by slice.
 Voxels voxels_of_array(const Numbers& hu) {
   const py::array array = array_of_numbers(hu, "hu");
   require_shape(array, "hu", {-1, -1, -1});
@@ -79,7 +79,7 @@ Ct ct_read(const std::filesystem::path& path, const std::string& series_uid) {
   return ct;
 }
 
-/// The voxels themselves, read-only; the array keeps the CT.
+/// The voxels themselves, read-only. The array keeps the CT alive.
 py::array_t<std::int16_t> voxels_of(const Ct& ct) {
   const py::capsule owner(new Ct(ct), [](void* pointer) { delete static_cast<Ct*>(pointer); });
   const auto& size = ct.grid().size;

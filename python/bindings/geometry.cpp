@@ -15,7 +15,7 @@ namespace {
 
 using namespace pybind11::literals;
 
-/// A camera or a rig that has no problems: InputError.
+/// Throws InputError unless the camera or rig is without problems.
 template <typename Owner>
 Owner sound(Owner owner) {
   owner.require_sound();
@@ -41,8 +41,8 @@ void bind_vector(py::class_<Owner>& owner, const char* name, Vector3 Owner::*mem
       });
 }
 
-/// An axis of the detector. Both are set one after the other, so that they are orthogonal is
-/// checked where the camera is used.
+/// An axis of the detector. Axes are set one after the other, so their orthogonality is checked
+/// only where the camera is used.
 void bind_axis(py::class_<Camera>& camera, const char* name, Vector3 Camera::*member) {
   camera.def_property(
       name,

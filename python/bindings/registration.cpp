@@ -102,7 +102,7 @@ void bind_result(py::module_& module) {
              &Registration::seconds);
 }
 
-/// The pixels themselves, read-only; the array keeps their owner.
+/// The pixels themselves, read-only. The array keeps their owner alive.
 py::array_t<float> image_of(const CaseView& view, std::span<const float> pixels) {
   using Owner = std::shared_ptr<const void>;
   const py::capsule keeper(new Owner(view.owner),
@@ -130,7 +130,7 @@ std::vector<PythonView> views_of(const PythonCase& owner) {
   return views;
 }
 
-/// Rows and columns of a camera's X-ray; any for a camera that the case does not have.
+/// Rows and columns of a camera's X-ray. Any for a camera that the case does not have.
 std::vector<py::ssize_t> shape_of(const PythonCase& owner, const std::string& camera) {
   for (const CaseView& view : owner.views())
     if (view.camera.name == camera) return {view.camera.size_px[1], view.camera.size_px[0]};

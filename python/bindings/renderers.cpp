@@ -23,7 +23,7 @@ std::vector<py::ssize_t> shape_of(const Renderer& renderer,
   return shape;
 }
 
-/// A pose given as a matrix, or by rotations and translations.
+/// A pose that is given as a matrix, or by rotations and translations.
 Pose pose_of(const Renderer& renderer,
              const Numbers& rotation,
              const Numbers& translation,
