@@ -102,14 +102,14 @@ void bind_ct(py::module_& module) {
       "origin_mm"_a = std::array<double, 3>{},
       "direction"_a =
           std::array<std::array<double, 3>, 3>{{{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}}},
-      "A CT of an array (k, j, i) of whole HU, int16 or exact as int16. An int16 array in C order "
-      "is not copied: it must not change afterwards, because attenuation and hash are kept. "
-      "spacing_mm and origin_mm are (x, y, z), the columns of direction those of i, j, k.");
+      "A CT from an array (k, j, i) of whole HU, int16 or exact as int16. An int16 array in C "
+      "order is not copied and must not change afterwards, because attenuation and hash are kept. "
+      "spacing_mm and origin_mm are (x, y, z). The columns of direction belong to i, j, k.");
   ct.def_static("read",
                 &ct_read,
                 "path"_a,
                 "series_uid"_a = "",
-                "A DICOM folder, NIfTI, MetaImage or NRRD file.");
+                "Reads a DICOM folder, or a NIfTI, MetaImage or NRRD file.");
   ct.def_property_readonly("hu", &voxels_of, "HU as int16 (k, j, i), read-only, not a copy.");
   ct.def_property_readonly(
       "size", [](const Ct& self) { return self.grid().size; }, "(i, j, k)");
@@ -122,10 +122,10 @@ void bind_ct(py::module_& module) {
   ct.def_property_readonly("direction", [](const Ct& self) {
     return py::array_t<double>({3, 3}, self.grid().direction.data());
   });
-  ct.def_property_readonly("content_sha256",
-                           &Ct::content_sha256,
-                           "Of size and voxels, not of where they lie: Field.is_of(ct) compares "
-                           "that, too.");
+  ct.def_property_readonly(
+      "content_sha256",
+      &Ct::content_sha256,
+      "Hash of size and voxels, but not of their place, which Field.is_of(ct) compares too.");
   ct.def(py::pickle(
       [](const Ct& self) {
         const CtGrid& grid = self.grid();
