@@ -452,7 +452,7 @@ void ImageQualityOptions::describe(Fields& field_list) {
       .choice(field_look_up_names());
   field_list("split_loss_poses",
              split_loss_poses,
-             "Split the loss at so many poses into interpolation and quantisation; some ten "
+             "Split the loss at this many poses into interpolation and quantisation; some ten "
              "ray-cast DRRs each")
       .at_least(0);
   field_list.part(ray_caster);

@@ -396,11 +396,11 @@ void describe_methods(Fields& field, RegistrationStudyOptions& options) {
       });
   field("raycast_starts_per_interval",
         options.raycast_starts_per_interval,
-        "With --renderer both: so many of each interval's starts also by ray casting (default: "
+        "With --renderer both: this many of each interval's starts also by ray casting (default: "
         "all)");
   field("raycast_intervals",
         options.raycast_intervals,
-        "With --renderer both: ray casting only in the first so many intervals (default: all)");
+        "With --renderer both: ray casting only in this many first intervals (default: all)");
   field("equivalence_margin_mm",
         options.equivalence_margin_mm,
         "Field and ray casting are equivalent when their ends are this near on average over "

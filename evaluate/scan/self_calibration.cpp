@@ -250,7 +250,7 @@ void SelfCalibrationOptions::describe(Fields& field) {
   field.leave_out(coarse_px, "one value suits every scan");
   field("working_px",
         working_px,
-        "Images are binned until their larger side has at most so many pixels")
+        "Images are binned until their larger side has at most this many pixels")
       .within(32, 4096);
   field("search_px", search_px, "The same while distance and tilt of the detector are sought")
       .within(32, 4096);
@@ -259,7 +259,7 @@ void SelfCalibrationOptions::describe(Fields& field) {
         "The detector's distance, which scales all lengths, is sought within this share of the "
         "stated one; 0: kept. Default: the scan's distance_tolerance")
       .within(0.0, 0.3);
-  field("tilt_deg", tilt_deg, "The detector's tilt is sought within so many degrees; 0: kept")
+  field("tilt_deg", tilt_deg, "The detector's tilt is sought within this many degrees; 0: kept")
       .within(0.0, 10.0);
 }
 

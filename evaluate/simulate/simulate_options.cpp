@@ -26,7 +26,7 @@ void describe_patient(Fields& field, SimulateOptions& o) {
         "X-ray cameras: treatment-room, c-arm-12in or a rig.toml; every camera takes one X-ray");
   field.part(o.attenuation);
   field.at("water_mu_per_mm").help =
-      "What 0 HU stands for, 1/mm; fixes the effective energy of the HU scale";
+      "Attenuation of 0 HU, 1/mm; fixes the effective energy of the HU scale";
 }
 
 void describe_output(Fields& field, SimulateOptions& o) {
@@ -224,7 +224,7 @@ void SimulateOptions::describe(Fields& field) {
       "ideal", is_ideal, "All effects off, float pixels; with --no-fiducials pure line integrals");
   field.start_group("");
   field.part(xray);
-  field.start_group("Stress (what real X-rays have)");
+  field.start_group("Stress (effects in real X-rays)");
   field.part(stress);
   field.start_group("Cone-beam scan (instead of a study)");
   field.part(cone_beam);

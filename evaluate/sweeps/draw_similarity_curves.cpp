@@ -225,8 +225,8 @@ std::vector<std::string> problems(const SimilarityCurvesOptions& options) {
 void SimilarityCurvesOptions::describe(Fields& field) {
   field.part<MethodOptions>(*this);
   field("case", case_name, "Case of the study (default: its only one)");
-  field("half_width_mm", half_width_mm, "Translations reach so far, mm");
-  field("half_width_deg", half_width_deg, "Rotations reach so far, degrees");
+  field("half_width_mm", half_width_mm, "Largest translation to either side, mm");
+  field("half_width_deg", half_width_deg, "Largest rotation to either side, degrees");
   field("curve_step_mm", curve_step_mm, "Step of translations, mm");
   field("curve_step_deg", curve_step_deg, "Step of rotations, degrees");
   field.part(resume);

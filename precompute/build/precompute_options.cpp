@@ -148,10 +148,9 @@ void describe_casting(Fields& field, PrecomputeOptions& options) {
   step.help = "Trilinear caster: largest distance of samples along a ray, mm";
   field.part(options.attenuation);
   field.at("water_mu_per_mm").decides(kCastingStage);
-  field(
-      "material",
-      options.material,
-      "What of the CT the field holds: all, or bone alone, for a tube's spectrum (docs/spectra.md)")
+  field("material",
+        options.material,
+        "Part of the CT in the field: all, or only bone, for a tube's spectrum (docs/spectra.md)")
       .one_of({"all", "bone"})
       .decides(kCastingStage);
   field("projections",

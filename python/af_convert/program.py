@@ -52,7 +52,7 @@ def parser():
                         "study.toml and rig.toml, of cameras and --ct")
     result.add_argument("-o", "--output", metavar="OUT", help="file to write; of formats that hold one camera, one file per camera: "
                         "OUT-NAME. Without it texts are printed")
-    rig = result.add_argument_group("What camera files leave open")
+    rig = result.add_argument_group("Settings that camera files leave open")
     rig.add_argument("--rig-names", type=lambda text: text.split(","), metavar="NAME,...",
                      help="names of the cameras, in the files' order; without it from the files' names")
     rig.add_argument("--rig-size-px", type=_numbers(2, 1, 32768, int), metavar="COLUMNS,ROWS", help="size of the images")
@@ -75,8 +75,8 @@ def parser():
                      "not state them")
     rig.add_argument("--rig-flip", choices=("rows", "columns"), metavar="AXIS", help="rows or columns: the X-rays are stored with "
                      "them in the other order than the files' convention has it")
-    of_pose = result.add_argument_group("What a pose is of")
-    of_pose.add_argument("--study", metavar="STUDY.toml", help="study whose CT, cameras and nominal pose it is of")
+    of_pose = result.add_argument_group("CT and cameras of a pose")
+    of_pose.add_argument("--study", metavar="STUDY.toml", help="study with the CT, cameras and nominal pose")
     of_pose.add_argument("--case", metavar="NAME", help="its case; without it the only one")
     of_pose.add_argument("--ct", metavar="CT", help="the CT, for Autoscoper, DiffDRR and DICOM, read by af-inspect")
     of_pose.add_argument("--rig", metavar="RIG", help="the cameras, for DiffDRR: any camera files, with commas between them")

@@ -14,13 +14,14 @@ MODULES = {"jinja2": "python3-jinja2", "matplotlib": "python3-matplotlib"}
 
 def parser():
     program = argparse.ArgumentParser(
-        prog="af-report", description="Makes what people read of the numbers that af-evaluate writes. With --output one page of all "
-        "finished runs in and below the folders; without it figures and tables beside their numbers.", allow_abbrev=False)
+        prog="af-report", description="Makes a page, figures and tables for people from the numbers that af-evaluate writes. With "
+        "--output it makes one page of all finished runs in and below the folders; without it figures and tables beside their "
+        "numbers.", allow_abbrev=False)
     program.add_argument("paths", metavar="PATH", nargs="+", help="Folders of results; without --output also tables (NAME.csv) of "
                          "af-evaluate compare and held-out, jobs/rate-against-truth.sh and bench-scaling")
     program.add_argument("-o", "--output", metavar="PATH", help="The page to write")
     program.add_argument("--title", metavar="TEXT", help="The page's title (default: made from the cases' names)")
-    program.add_argument("--screen", action="store_true", help="Of tables of compare: measures against optimisers instead of a row per run")
+    program.add_argument("--screen", action="store_true", help="For tables of compare: measures against optimisers instead of a row per run")
     add_common_options(program)
     return program
 

@@ -40,13 +40,12 @@ void InspectOptions::describe(Fields& field) {
   field("json", as_json, "Print one JSON array instead of text");
   field("list_views",
         lists_views,
-        "Of studies, for scripts: one line per view, its case and its camera with a tab between "
+        "For scripts: print one line per view of a study, its case and camera with a tab between "
         "them")
       .excludes({"--json"});
   field("list_inputs",
         lists_inputs,
-        "Of studies, for scripts: one line per case and file that it reads, with a tab between "
-        "them")
+        "For scripts: print one line per case and file that a study reads, with a tab between them")
       .excludes({"--json", "--list-views"});
   field("pictures",
         pictures,
