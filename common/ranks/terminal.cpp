@@ -2,6 +2,8 @@
 #include "ranks/terminal.h"
 
 #include <iostream>
+#include <mutex>
+#include <set>
 
 namespace af {
 
@@ -12,7 +14,11 @@ void inform(const Communicator& communicator, const std::string& message) {
 }
 
 void warn(const Communicator& communicator, const std::string& message) {
-  inform(communicator, "warning: " + message);
+  // Every case, renderer or camera that reads a file finds the same oddities in it.
+  static std::mutex mutex;
+  static std::set<std::string> known;
+  const std::scoped_lock lock(mutex);
+  if (known.insert(message).second) inform(communicator, "warning: " + message);
 }
 
 }  // namespace af

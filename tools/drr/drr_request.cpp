@@ -491,9 +491,15 @@ void run_drr(const DrrOptions& options, const Communicator& world) {
   require_room(poses.size(), scene.view, options.output);
   const std::vector<Image2d> drrs =
       render_poses(*scene.renderer, scene.view, poses, *scene.pool, scene.note);
-  for (std::size_t i = 0; i < drrs.size(); ++i)
-    if (std::ranges::all_of(drrs[i].pixels, [](float value) { return value == 0.0f; }))
-      warn(world, "pose " + std::to_string(i) + ": the DRR is empty: no ray meets the CT");
+  const auto is_empty = [](const Image2d& drr) {
+    return std::ranges::all_of(drr.pixels, [](float value) { return value == 0.0f; });
+  };
+  if (const auto first = std::ranges::find_if(drrs, is_empty); first != drrs.end())
+    warn(world,
+         std::to_string(std::ranges::count_if(first, drrs.end(), is_empty)) + " of " +
+             std::to_string(drrs.size()) + " DRRs are empty, the first at pose " +
+             std::to_string(first - drrs.begin()) +
+             ": no ray meets the CT; check the pose and the camera");
   std::cout << write_drrs(drrs, scene.view, options) << '\n';
 }
 
