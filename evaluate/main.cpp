@@ -21,7 +21,7 @@
 #include "evaluate/sweeps/sweep_field_parameters.h"
 #include "files/shell_words.h"
 
-// Outside app_main only the declaration of options can throw, which is a defect of this program.
+// Outside app_main only the declaration of options can throw, and that would be a defect.
 // NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
   using namespace af::evaluation;

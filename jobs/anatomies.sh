@@ -15,11 +15,11 @@ stress_of() {
   esac
 }
 
-# make_study NAME-VARIANT KIND SOURCE STRESS: a simulated case whose regions have --roi-px, about the detectors' middles.
+# make_study NAME-VARIANT KIND SOURCE STRESS: makes a simulated case whose regions of --roi-px are centred on the detectors.
 make_study() {
   local name=$1 kind=$2 source=$3 stress=$4 study="$output/studies/$1/study.toml" corner=$(((512 - roi_px) / 2))
   "$bin/af-simulate" "--$kind" "$source" --case "${name%%-*}" --rig treatment-room --seed "$seed" --no-fiducials \
     --roi-px "$roi_px" "$roi_px" ${stress:+--stress "$stress"} --force -o "$output/studies/$name" &&
-    # af-simulate lets regions grow until they hold the target box.
+    # af-simulate enlarges regions until they hold the target box.
     sed -i "s/^roi_px.*/roi_px = [$corner, $corner, $roi_px, $roi_px]/" "$study"
 }

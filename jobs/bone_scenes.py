@@ -15,7 +15,7 @@ DETECTOR_PX, FOCAL_PX, SOURCE_MM = 480, 1700.0, 950.0
 MIDDLE = np.array([120.0, 150.0, 80.0])
 SIZE_MM = np.array([64, 56, 96])
 FINE_MM = 0.5
-CENTER_CT = np.array([-31.5, -27.5, 47.5])  # NIfTI's frame is RAS, this project's LPS: x and y run against the voxels'
+CENTER_CT = np.array([-31.5, -27.5, 47.5])  # NIfTI's frame is RAS, this project's is LPS: x and y run against the voxels'
 TARGET_BOX_CT = [[-46, -40, 5], [-18, -16, 90]]
 # The tip of the process, the notch and a point of the shaft.
 LANDMARKS_CT = np.array([[-44.0, -34.0, 2.0], [-16.0, -24.0, 14.0], [-36.0, -28.0, 70.0]])
@@ -58,13 +58,13 @@ class Grid:
         return sum(offset**2 for offset in offsets) < 1
 
     def shaft(self, bend, outer, inner, cortex=1900.0):
-        """A hollow bent shaft that is cut at the upper end."""
+        """A hollow bent shaft, cut at the upper end."""
         radius = np.hypot(self.x - 30 - bend * (self.z - 20) ** 2, (self.y - 28) / 0.8)
         return np.where(radius < outer, np.where(radius > inner, cortex, 1150.0), 0.0) * (self.z > 16)
 
 
 def bone(grid, seed):
-    """A shaft with a head, a process and a notch; no symmetry. Shapes and densities vary with the seed; grain of the finest voxels."""
+    """A shaft with a head, a process and a notch; it has no symmetry. The seed varies shapes, densities and grain."""
     random = np.random.default_rng([seed, 1])
 
     def about(value, share=0.15):
@@ -85,7 +85,7 @@ def bone(grid, seed):
 
 
 def other_bone(grid, random):
-    """Thinner, with a round end."""
+    """A thinner bone with a round end."""
     end = grid.ellipsoid([30, 28, 16], [random.uniform(7, 11)] * 3)
     outer = random.uniform(5, 8)
     return np.maximum(grid.shaft(random.uniform(-0.004, 0.004), outer, outer - 2.5), np.where(end, 1300.0, 0.0))
@@ -102,7 +102,7 @@ def soft_tissue(grid, random):
 
 
 def halved(values):
-    """Voxels twice as wide: the mean; 0, which is outside the bone, where less than half is bone."""
+    """The mean in voxels twice as wide. It is 0, as outside the bone, where less than half is bone."""
     blocks = values.reshape(*(n for size in values.shape for n in (size // 2, 2)))
     share = (blocks > 0).mean(axis=(1, 3, 5))
     return np.where(share >= 0.5, blocks.mean(axis=(1, 3, 5)), 0.0)
@@ -112,7 +112,7 @@ def halved(values):
 
 
 def write_nifti(path, values, spacing_mm):
-    """First coordinates are those of a grid whose coarse voxels have theirs at 0."""
+    """The first voxel is placed as in a grid whose first coarse voxel has its centre at 0."""
     first = 0.5 * spacing_mm - 0.5
     header = bytearray(352)
     struct.pack_into("<i", header, 0, 348)
@@ -129,7 +129,7 @@ def write_nifti(path, values, spacing_mm):
 
 
 def write_mayacam(path, beam, down):
-    """The projection matrix (3x4, px of mm) of a camera whose beam goes through MIDDLE."""
+    """Returns the projection matrix (3x4, px from mm) of a camera whose beam goes through MIDDLE."""
     column = np.cross(down, beam)
     turn = np.stack([column, down, beam])
     translation = -turn @ (MIDDLE - SOURCE_MM * beam)
@@ -152,7 +152,7 @@ def mha_values(path):
 
 
 def write_xray(path, attenuation, noise, random):
-    """Grey levels from 0 to 255; `noise`: their standard deviation."""
+    """Writes grey levels from 0 to 255. `noise` is their standard deviation."""
     seen = 240 * np.exp(-attenuation) + random.normal(0, noise, attenuation.shape)
     row, column = np.mgrid[: seen.shape[0], : seen.shape[1]]
     middle = seen.shape[0] / 2
@@ -167,7 +167,7 @@ def write_xray(path, attenuation, noise, random):
 
 
 def pose_of(turn, offset):
-    """Room from CT: the ROI centre `offset` (mm) from MIDDLE, upright but for `turn`."""
+    """Room from CT. The ROI centre is `offset` (mm) from MIDDLE, and the bone is upright except for `turn`."""
     upright = np.column_stack([[0.98, 0.0, -0.199], [0.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     upright[:, 0] /= np.linalg.norm(upright[:, 0])
     upright[:, 1] = np.cross(upright[:, 2], upright[:, 0])
@@ -176,13 +176,13 @@ def pose_of(turn, offset):
 
 
 def turned(random, most_deg, most_about_axis_deg):
-    """About an axis in any direction, after a turn about the bones' own."""
+    """A turn about an axis in any direction, after a turn about the bones' own axis."""
     about_axis = rotation([0, 1, 0], random.uniform(-most_about_axis_deg, most_about_axis_deg))
     return rotation(random.normal(size=3), random.uniform(0, most_deg)) @ about_axis
 
 
 def pose_beside(random):
-    """Of another bone, which may cross the bone in a view."""
+    """The pose of another bone, which may cross the bone in a view."""
     angle, away_mm = random.uniform(0, 2 * np.pi), random.uniform(20, 34)
     return pose_of(turned(random, 25, 180), [away_mm * np.cos(angle), random.uniform(-5, 5), away_mm * np.sin(angle)])
 
@@ -199,7 +199,7 @@ def study_text(case, gold, landmarks_px):
 
 
 def write_scene(folder, case, seed, af_drr):
-    """study.toml and its files in `folder`; the gold pose (4x4)."""
+    """Writes study.toml and its files into `folder`. Returns the gold pose (4x4)."""
     random = np.random.default_rng([seed, 2])
     down = np.array([0.0, 1.0, 0.0])
     beams = [np.array([0.6, 0.0, 0.8]), np.array([-0.95, 0.0, 0.3122])]
@@ -226,7 +226,7 @@ def write_scene(folder, case, seed, af_drr):
     noise = random.uniform(1, 5)
     for camera, image in zip(CAMERAS, attenuation):
         write_xray(folder / f"{camera}.mha", image, noise, random)
-    # Marked 3 px wrong (one sigma).
+    # Landmarks are marked with an error of 3 px (one sigma).
     marks = [[projected(m, gold[:3, :3] @ p + gold[:3, 3]) + random.normal(0, 3, 2) for p in LANDMARKS_CT] for m in matrices]
     (folder / "study.toml").write_text(study_text(case, gold, marks))
     return gold

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Registration of single bones among others, drawn at random (bone_scenes.py), with --preset bone: success, and how well it
-# knows its errors.
+# Registers single bones among others, drawn at random (bone_scenes.py), with --preset bone. It measures success, and how
+# well registration knows its errors.
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
@@ -52,7 +52,7 @@ mkdir -p "$output"/{studies,runs}
 # shellcheck disable=SC2034  # for stage()
 stages_of_any_build=yes stage_inputs=$(sha256sum <"$af_root/jobs/bone_scenes.py")
 
-# make_scene NAME SEED: what an interrupted one left goes first.
+# make_scene NAME SEED: makes a scene, after removing what an interrupted run left of it.
 make_scene() {
   rm -rf "$output/studies/$1"
   "$python" "$af_root/jobs/bone_scenes.py" --seed "$2" --case "$1-p1" --af-drr "$bin/af-drr" -o "$output/studies/$1"

@@ -1,12 +1,12 @@
 # shellcheck shell=bash disable=SC2034,SC2154  # variables pass between this file and its caller
 # SPDX-License-Identifier: Apache-2.0
-# What a study's chain consists of: a field for every view, the registrations of every case, a report. Sourced by
-# jobs/submit.sh (on Slurm) and jobs/run-study.sh (on this machine, and for jobs/Snakefile), so that all run the same
+# The stages of a study's chain: a field for every view, the registrations of every case, a report. jobs/submit.sh (on
+# Slurm) and jobs/run-study.sh (on this machine, and for jobs/Snakefile) source this file, so that all run the same
 # commands. The caller has sourced lib.sh and sets output, and maybe resources.
 
 study="" resources="$af_root/jobs/slurm/resources.sh"
 
-# take_study WORD: takes WORD, which is no option, as the study.
+# take_study WORD: takes WORD as the study, or refuses it as an unknown option.
 take_study() {
   [[ "$1" != -* ]] || die 2 "unknown option '$1' (try --help)"
   [[ -z "$study" ]] || die 2 "one study at a time: '$study' and '$1' were given"
@@ -28,10 +28,10 @@ open_study() {
 declare -A cameras_of=()
 case_names=() most_views=0
 
-# read_chain: reads cases and cameras of the study; reports what is wrong with it.
+# read_chain: reads the cases and cameras of the study, and reports what is wrong with it.
 read_chain() {
   local views case_name camera view_count
-  # One line per view: case, camera.
+  # There is one line per view: case, camera.
   views=$("$bin/af-inspect" --list-views "$study")
   while IFS=$'\t' read -r case_name camera; do
     [[ -v cameras_of["$case_name"] ]] || case_names+=("$case_name")

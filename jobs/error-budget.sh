@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# What each part of the chain from CT to pose adds to the error of a registration: changes one thing after the other,
-# and registers from the same starts after every change.
+# Measures what each part of the chain from CT to pose adds to the error of a registration. It changes one thing after the
+# other, and registers from the same starts after every change.
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Four simulated patients in one study: a patient's skull CT and three phantoms.
+# Makes a study of four simulated patients: a patient's skull CT and three phantoms.
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"

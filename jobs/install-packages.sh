@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Installs the packages of Debian 12 or 13 that building and running needs. Idempotent: with everything in place it
-# asks dpkg only and ends at once. Needs root or sudo only when something is missing.
+# Installs the packages of Debian 12 or 13 that building and running needs. With everything in place it only asks dpkg and
+# ends at once. It needs root or sudo only when something is missing.
 set -euo pipefail
 
 # Compilers and build tools, libraries, the Python module, figures, what checks pages and makes packages, and the default CT
@@ -21,14 +21,14 @@ base_packages=(
 # Debian 13's package of ITK names these libraries without depending on them.
 trixie_packages=(libfftw3-dev)
 benchmark_packages=(plastimatch libfaiss-dev libopenblas-dev)
-# What jobs/peers.sh registers with.
+# The peers in jobs/peers.sh.
 peer_packages=(plastimatch elastix python3-torch python3-nlopt)
 # Formatter, linters, the browser that opens the report in a test, and what reads manual pages, completions and fields in tests.
 lint_packages=(shellcheck chromium groff-base bsdextrautils zsh hdf5-tools)
 bookworm_lint_packages=(clang-format-14 clang-tidy-14)
 # Large, and only one test and one example of the Python module need it; they are skipped without it.
 torch_packages=(python3-torch)
-# What runs jobs on a cluster.
+# For jobs on a cluster.
 slurm_packages=(slurm-wlm munge snakemake)
 
 usage() {
@@ -54,7 +54,7 @@ is_installed() {
   [[ "$(dpkg-query --show --showformat '${db:Status-Status}' "$1" 2>/dev/null || true)" == installed ]]
 }
 
-# The code name of the release this is: bookworm, trixie, or another one's.
+# The code name of this release: bookworm, trixie or another.
 release_name() { sed -n 's/^VERSION_CODENAME=//p' /etc/os-release; }
 
 main() {

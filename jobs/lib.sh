@@ -32,7 +32,7 @@ duration() {
 
 core_count() { nproc 2>/dev/null || echo 1; }
 
-# Where the programs are: of the repository's release build or, installed, PREFIX/bin beside
+# The folder of the programs: the repository's release build or, installed, PREFIX/bin beside
 # PREFIX/share/attenuation-fields/jobs.
 program_folder() {
   if [[ -f "$af_root/CMakeLists.txt" ]]; then
@@ -52,7 +52,7 @@ need_programs() {
   done
 }
 
-# One compiler per core, but not more than memory allows (the ITK and CLI11 files need up to about 1.5 GB each).
+# One compiler per core, but no more than memory allows: the ITK and CLI11 files need up to about 1.5 GB each.
 build_job_count() {
   local cores memory_kb
   cores=$(core_count)
@@ -85,15 +85,15 @@ build_preset() {
   fi
 }
 
-# Jobs of Open MPI 4.1 that run side by side share a folder, named after the machine without its domain. A job that ends
-# removes it when it is empty, even while another one starts.
+# Jobs of Open MPI 4.1 that run side by side share a folder, which is named after the machine without its domain. A job that
+# ends removes an empty folder, even while another job is starting.
 keep_folder_of_mpirun() {
   local host
   host=$(uname -n)
   (umask 077 && mkdir -p "${TMPDIR:-/tmp}/ompi.${host%%.*}.$(id -u)/keep")
 }
 
-# Several ranks of a program on this machine: works as root, with more ranks than cores, in containers.
+# Runs several ranks of a program on this machine. This works as root, with more ranks than cores, and in containers.
 run_ranks() {
   local ranks=$1
   shift
@@ -106,13 +106,13 @@ run_ranks() {
     mpirun -n "$ranks" --oversubscribe --bind-to none "$@"
 }
 
-# Options of scripts: need_value OPTION ARGUMENTS_LEFT, need_count OPTION VALUE.
+# Checks of scripts' options: need_value OPTION ARGUMENTS_LEFT, need_count OPTION VALUE.
 need_value() { (($2 >= 2)) || die 2 "option $1 needs a value (try --help)"; }
 need_count() { [[ "$2" =~ ^[1-9][0-9]{0,6}$ ]] || die 2 "$1 = '$2' must be a whole number from 1 to 9999999"; }
 need_seed() { [[ "$2" =~ ^[0-9]{1,18}$ ]] || die 2 "$1 = '$2' must be a whole number"; }
 
-# need_ct OPTION NAME=PATH: sets named_ct to the same with the full path. Names become parts of files' names, whose other
-# parts stand between hyphens.
+# need_ct OPTION NAME=PATH: sets named_ct to the same with the full path. Names become parts of file names, where hyphens
+# separate them from other parts.
 need_ct() {
   [[ "$2" =~ ^[A-Za-z0-9_]+=.+$ ]] || die 2 "$1 = '$2' must be NAME=PATH, with letters, digits and _ in NAME"
   [[ -e "${2#*=}" ]] || die 4 "$1 ${2#*=}: no such file or folder"

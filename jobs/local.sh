@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# The whole job on one machine: packages, build, and a study from a CT to a report.
+# Does the whole job on one machine: packages, build, and a study from a CT to a report.
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
@@ -80,7 +80,7 @@ fi
 [[ -n "$ranks" ]] || ranks=$(core_count)
 cores=$(core_count)
 
-# The quick preset has the paper's resolutions over a smaller range of translations and compares less.
+# The quick preset has the paper's resolutions, a smaller range of translations and fewer comparisons.
 field_options=(--uv-nodes 64 --st-nodes 256 --codewords 16384 --training-fraction 0.1 --max-rotation-deg 10)
 if [[ "$preset" == paper ]]; then
   field_options+=(--max-translation-mm 100)
@@ -148,7 +148,7 @@ if [[ -z "$ct" && -z "$phantom" ]]; then
   plan_stage ct 1 "Unpack the default CT"
 elif [[ -n "$ct" ]]; then
   ct="$(realpath "$ct")"
-  # When the CT's file changes, the study starts anew.
+  # The CT's file decides whether the study starts anew.
   stage_inputs=$(find "$ct" -type f -printf '%P %s %T@\n' | LC_ALL=C sort | sha256sum)
 fi
 field_seconds=12

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# The tables and figures of Russakoff et al. 2005, each by one command.
+# Makes the tables and figures of Russakoff et al. 2005, each by one command.
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
@@ -105,7 +105,7 @@ need_programs "$bin" af-precompute af-evaluate
 open_output "$target"
 mkdir -p "$output/fields" "$output/runs" "$output/paper"
 
-# Every case and its cameras: lines "skull A".
+# Every case with each of its cameras: lines "skull A".
 views() {
   awk -F '"' '/^name *=/ {name = $2} /^camera *=/ {print name, $2}' "$output/patients/study.toml"
 }

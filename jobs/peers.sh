@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Registrations by other programs' DRRs and by automatic differentiation, and ours, from the same starts.
+# Compares registrations by other programs' DRRs and by automatic differentiation with ours, from the same starts.
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
@@ -67,7 +67,7 @@ fi
 # has_python MODULES: whether the chosen Python imports them.
 has_python() { "$python" -c "import $1" 2>/dev/null; }
 
-# field CASE CAMERA: its time goes beside it when it was made now.
+# field CASE CAMERA: makes a field. If it is made now, its time is written beside it.
 field() {
   local file="$output/fields/$1-$2.af.h5" begin=$EPOCHREALTIME
   touch "$output/.stages/before"
@@ -86,7 +86,7 @@ evaluate() {
     --intervals "$intervals" --seed "$seed" -o "$output/runs/$name" "$@"
 }
 
-# peer NAME CASE SCRIPT STARTS: another program's poses, judged by our errors.
+# peer NAME CASE SCRIPT STARTS: finds poses by another program, and judges them by our errors.
 peer() {
   local name=$1 case_name=$2 script=$3 most=$4 poses="$output/poses/$2-$1.csv"
   stage "$case_name-$name-poses" "$poses" "$python" "$af_root/evaluate/peers/$script" \
@@ -100,7 +100,7 @@ peer() {
 
 patient=()
 ((anatomy_seed == 0)) || patient=(--anatomy-seed "$anatomy_seed")
-# What the peers' poses depend on beside the words of their commands.
+# The peers' poses depend on these besides the words of their commands.
 # shellcheck disable=SC2034  # for stage()
 stage_inputs="seed $seed, $starts in each of $intervals, $(cat "$af_root"/evaluate/peers/*.py | sha256sum)"
 for variant in clean stressed; do
@@ -119,7 +119,7 @@ for variant in clean stressed; do
   for preset in robust fast; do
     evaluate "$case_name-$preset" "$case_name" "${of_case[@]}" --preset "$preset" --renderer both --no-uncertainty
   done
-  # Hundreds of poses per start: by ray casting that takes minutes each.
+  # Hundreds of poses per start take minutes each by ray casting.
   evaluate "$case_name-paper" "$case_name" "${of_case[@]}" --preset paper --no-uncertainty
   if has_python numpy,torch; then
     peer autodiff "$case_name" autodiff_registration.py "$autodiff_starts"

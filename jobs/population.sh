@@ -52,7 +52,7 @@ command again, also with more patients. Needs the programs in build/release/bin 
 TEXT
 }
 
-# A moved bone changes the X-rays alone: the CT and the fields are those of the variant without it.
+# A moved bone changes only the X-rays. The CT and the fields are those of the variant without it.
 ct_variant_of() { case "$1" in moved) echo clean ;; moved+*) echo "${1#moved+}" ;; *) echo "$1" ;; esac }
 
 # --- options -----------------------------------------------------------------------------------------------------
@@ -119,7 +119,7 @@ bin=$(program_folder)
 need_programs "$bin" af-simulate af-precompute af-evaluate af-inspect
 open_output "$target"
 mkdir -p "$output"/{studies,fields,starts,runs}
-# A build that changes a part of the programs leaves what was measured; population.md names the commit.
+# A new build of the programs does not invalidate what was measured; population.md names the commit.
 stages_of_any_build=yes
 
 # --- one patient -------------------------------------------------------------------------------------------------
@@ -136,8 +136,8 @@ bone_option() {
   printf '%s\n' "$option" "${bones[$((number / ${#kind_list[@]} % ${#bones[@]}))]}"
 }
 
-# make_session PATIENT SOURCE VARIANT POSE: X-rays of a patient at one true pose. One planning CT serves all poses: those
-# after the first refer to the first one's, which matters where the CT is degraded by noise of its own.
+# make_session PATIENT SOURCE VARIANT POSE: makes X-rays of a patient at one true pose. One planning CT serves all poses, so
+# those after the first refer to the first one's. That matters if the CT is degraded by noise of its own.
 make_session() {
   local patient=$1 source=$2 variant=$3 pose=$4 name="$1-$3-p$4" ct_variant stress words bone=()
   IFS=$'\t' read -r -a words <<<"$source"
@@ -152,10 +152,10 @@ make_session() {
   sed -i "s|^ct = \"ct.nii.gz\"|ct = \"../$patient-$ct_variant-p1/ct.nii.gz\"|" "$output/studies/$name/study.toml"
 }
 
-# one_view STUDY OUTPUT: every case without its second and further views.
+# one_view STUDY OUTPUT: writes the study with only the first view of every case.
 one_view() { awk '/^\[\[case\]\]/ { views = 0 } /^\[\[case.view\]\]/ { ++views } views < 2' "$1" >"$2"; }
 
-# sessions PATIENT SOURCE VARIANT: all true poses in one study, with two views and with one; sets study.
+# sessions PATIENT SOURCE VARIANT: makes studies of all true poses, with two views and with one, and sets study.
 sessions() {
   local patient=$1 variant=$3 pose studies=()
   study="$output/studies/$patient-$variant-2.toml"
@@ -178,7 +178,7 @@ register() {
     --start-rule within-range --no-pictures "${registration_options[@]}" "$@" -o "$output/runs/$folder"
 }
 
-# study_patient NAME SOURCE: every condition of one patient.
+# study_patient NAME SOURCE: runs every condition for one patient.
 study_patient() {
   local patient=$1 variant ct_variant camera count preset study
   stage_inputs="$2, seed $seed, $poses poses, $simulate_words, $field_words, $max_rotation_deg deg, $max_translation_mm mm: "
@@ -206,7 +206,7 @@ study_patient() {
 
 # --- on a cluster ------------------------------------------------------------------------------------------------
 
-# all_patients FUNCTION [ARGUMENT]: FUNCTION NAME SOURCE [ARGUMENT] for every patient; sets number and kind.
+# all_patients FUNCTION [ARGUMENT]: calls FUNCTION NAME SOURCE [ARGUMENT] for every patient, with number and kind set.
 all_patients() {
   local number kind ct
   for ((number = first; number < first + patients; ++number)); do
@@ -218,15 +218,15 @@ all_patients() {
   done
 }
 
-# gather NAME SOURCE VARIANT: one more patient of the studies of a cluster.
+# gather NAME SOURCE VARIANT: adds one more patient to the studies for a cluster.
 gather() {
   stage_inputs="$2"
   sessions "$1" "$2" "$3"
   gathered+=("$output/studies/$1-$3-2.toml")
 }
 
-# submit_conditions: one chain of jobs per variant, views and preset, each by jobs/submit.sh. A chain builds a field per
-# case and camera.
+# submit_conditions: submits one chain of jobs per variant, number of views and preset, each by jobs/submit.sh. A chain
+# builds a field per case and camera.
 submit_conditions() {
   local variant count preset condition gathered
   for variant in "${variant_list[@]}"; do
@@ -258,7 +258,7 @@ submit_conditions() {
 
 # --- tables ------------------------------------------------------------------------------------------------------
 
-# make_tables: of the patients that are finished.
+# make_tables: makes the tables, from the patients that are finished.
 make_tables() {
   local conditions=() folder
   for folder in "$output"/runs/*/ "$output"/slurm/*/registration/; do

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Bytes of fields against the PSNR of their DRRs, and against how far their registrations end from those by ray casting.
+# Compares the bytes of fields with the PSNR of their DRRs, and with the distance of their registrations from ray casting's.
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
@@ -91,13 +91,13 @@ bin=$(program_folder)
 need_programs "$bin" af-simulate af-precompute af-evaluate af-report
 open_output "$output"
 mkdir -p "$output"/{studies,fields,quality,starts,runs,lattice}
-# Another build leaves what was measured: one changes a part of the programs and does that part again.
+# A new build does not invalidate what was measured, so that a change of one program repeats only its part.
 stages_of_any_build=yes
 
 # cameras_of VIEWS
 cameras_of() { if (($1 == 2)); then echo A B; else echo A; fi; }
 
-# source_of ANATOMY: sets kind and source, what it is simulated from.
+# source_of ANATOMY: sets kind, and source, from which it is simulated.
 source_of() {
   local ct
   for ct in "${cts[@]}"; do
@@ -116,10 +116,10 @@ source_of() {
   esac
 }
 
-# one_view STUDY OUTPUT: the study without its second and further views. Its files stay where they are.
+# one_view STUDY OUTPUT: writes the study with only its first view. Its files stay where they are.
 one_view() { awk '/^\[\[case.view\]\]/ { ++views } views < 2' "$1" >"$2"; }
 
-# fields_of NAME-VARIANT DESIGN VIEWS: makes what is missing, and sets field_options.
+# fields_of NAME-VARIANT DESIGN VIEWS: makes the missing fields, and sets field_options.
 fields_of() {
   local name=$1 design=${2%%=*} camera field options
   read -r -a options <<<"${2#*=}"
@@ -150,7 +150,7 @@ ct_of() {
   echo "$ct"
 }
 
-# lattice_errors NAME-VARIANT: by the first three designs.
+# lattice_errors NAME-VARIANT: measures lattice errors by the first three designs.
 lattice_errors() {
   local name=$1 design
   for design in "${designs[@]:0:3}"; do
@@ -161,7 +161,7 @@ lattice_errors() {
   done
 }
 
-# condition ANATOMY VARIANT VIEWS: one pair (or one) of X-rays: every design, and ray casting.
+# condition ANATOMY VARIANT VIEWS: registers one X-ray or a pair by every design, and by ray casting.
 condition() {
   local anatomy=$1 variant=$2 count=$3 name="$1-$2" study design starts
   local kind="" source=""
@@ -171,7 +171,7 @@ condition() {
   study="$output/studies/$name/study.toml"
   stage "study $name" "$study" make_study "$name" "$kind" "$source" "$(stress_of "$variant")"
   one_view "$study" "$output/studies/$name/one-view.toml"
-  # The same starts for any number of views: within the range of camera A's fields, which all cameras have.
+  # Starts lie within the range of camera A's fields, which all cameras have, so they are the same for any number of views.
   fields_of "$name" "${designs[0]}" 1
   starts="$output/starts/$name/starts.csv"
   stage "starts of $name" "$starts" "$bin/af-evaluate" registration --study "$output/studies/$name/one-view.toml" \
@@ -193,7 +193,7 @@ condition() {
 
 # --- tables and curves --------------------------------------------------------------------------------------------
 
-# json_number FILE REGEX: the number that the parenthesis of an extended regular expression holds, in the file without
+# json_number FILE REGEX: the number that the parenthesis of an extended regular expression captures in the file without
 # white space.
 json_number() {
   local text
@@ -202,17 +202,17 @@ json_number() {
   echo "${BASH_REMATCH[1]}"
 }
 
-# median_milliseconds METHODS_CSV RUN: of a registration; its last column is in seconds.
+# median_milliseconds METHODS_CSV RUN: the median time of a registration. The last column of the table is in seconds.
 median_milliseconds() { awk -F, -v run="$2" '$1 == run { printf "%.4g", 1000 * $NF }' "$1"; }
 
-# distances_to_raycast CSV DESIGN: starts, median, 95th percentile, maximum.
+# distances_to_raycast CSV DESIGN: the number of starts, and the median, 95th percentile and maximum of distances.
 distances_to_raycast() {
   awk -F, -v design="$2" 'NR == 1 { for (i = 1; i <= NF; ++i) at[$i] = i }
     ($2 == design && $4 == "raycast") || ($4 == design && $2 == "raycast") {
       printf "%d,%.4f,%.4f,%.4f", $at["starts"], $at["median_distance_mm"], $at["p95_distance_mm"], $at["max_distance_mm"] }' "$1"
 }
 
-# row RUN: of one design's registrations, RUN being runs/ANATOMY-VARIANT-VIEWS/DESIGN.
+# row RUN: the row for one design's registrations. RUN is runs/ANATOMY-VARIANT-VIEWS/DESIGN.
 row() {
   local run=$1 design name anatomy variant count ends camera bytes=0 key quality
   design=$(basename "$run") name=$(basename "$(dirname "$run")")
@@ -233,7 +233,7 @@ row() {
     "$(distances_to_raycast "$ends-pose-distances.csv" "$design")"
 }
 
-# all_rows: of every design of every pair of X-rays that is finished; two views before one, then by anatomy and size.
+# all_rows: a row per design and finished X-ray or pair. Two views come before one; then anatomy and size decide.
 all_rows() {
   local ends run
   for ends in "$output"/runs/*/ends.csv; do

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Registration of real X-rays whose true pose is known: views of a circular cone-beam scan against a CT that is
-# reconstructed from its other views.
+# Registers real X-rays whose true pose is known: views of a circular cone-beam scan against a CT that is reconstructed from
+# its other views.
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
@@ -69,7 +69,7 @@ done
 [[ -d "$folder" ]] || die 4 "$folder: no such folder"
 if [[ -z "$scan" ]]; then
   scan="$folder/scan.toml"
-  # The scan that the documentation measures comes without a file of ours.
+  # The scan in the documentation comes without a file of ours.
   cylinder="$af_root/docs/data/cbct-cylinder.toml"
   [[ -f "$scan" || ! -f "$folder/Projection359.png" || ! -f "$cylinder" ]] || scan=$cylinder
   [[ -f "$scan" ]] || die 4 "$scan: no such file; give --scan FILE (af-inspect --template scan prints one to fill in)"
@@ -89,11 +89,11 @@ mkdir -p "$output/fields" "$output/starts" "$output/runs" "$output/finishes"
 # --- the scan ----------------------------------------------------------------------------------------------------
 
 say "Geometry of the scan: $scan"
-# Lists of angles and of files stand beside the scan's file.
+# Lists of angles and of files are beside the scan's file.
 lists=$(sed -nE "s/^[[:space:]]*(angles|files)_file[[:space:]]*=[[:space:]]*[\"']([^\"']*)[\"'].*/\2/p" "$scan")
 stage_inputs="$(sha256sum <"$scan") $(state_of "$folder")"
 while IFS= read -r list; do
-  # af-scan says what is wrong with a list that is missing.
+  # af-scan reports a missing list.
   if [[ -n "$list" && -f "$(dirname "$scan")/$list" ]]; then stage_inputs+=" $(sha256sum <"$(dirname "$scan")/$list")"; fi
 done <<<"$lists"
 study="$output/study/study.toml"
@@ -103,7 +103,7 @@ water=$(sed -n 's/^water_mu_per_mm = //p' "$output/study/calibration.toml")
 [[ -n "$water" ]] || die 6 "$output/study/calibration.toml has no water_mu_per_mm"
 robust_field_words=$field_words
 if [[ "$states_fields" == no ]]; then
-  # Where nodes are a voxel apart, look-up loses what is finer than two voxels, and ends elsewhere than ray casting.
+  # With nodes a voxel apart, look-up loses what is finer than two voxels, and ends elsewhere than ray casting.
   half_voxel=$(awk '/^ct_voxel_mm = / { printf "%.4f", $3 < 0.2 ? 0.1 : $3 / 2 }' "$output/study/calibration.toml")
   [[ -n "$half_voxel" ]] || die 6 "$output/study/calibration.toml has no ct_voxel_mm"
   robust_field_words+=" --codewords 65536 --st-spacing-mm $half_voxel"
@@ -121,7 +121,7 @@ while IFS=$'\t' read -r case_name camera; do
   cameras_of[$case_name]+="$camera "
 done <<<"$views"
 
-# field_of PRESET CASE CAMERA: its file. A single view has its pair's nominal pose, and so its field.
+# field_of PRESET CASE CAMERA: the field's file. A single view has its pair's nominal pose, and therefore its field.
 field_of() {
   local kind=""
   [[ "$1" != robust || "$robust_field_words" == "$field_words" ]] || kind=-robust

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Registration methods against each other, on clean and on hard X-rays: one table.
+# Compares registration methods, on clean and on hard X-rays, in one table.
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
@@ -99,10 +99,10 @@ bin=$(program_folder)
 need_programs "$bin" af-simulate af-precompute af-evaluate af-register
 
 open_output "$output"
-# A method that is added or changed, and the program with it, costs only itself.
+# A method that is added or changed, together with the program, repeats only its own runs.
 stages_of_any_build=yes
 
-# build_fields NAME STUDY: one field per camera, NAME/A.af.h5 and NAME/B.af.h5.
+# build_fields NAME STUDY: builds one field per camera, NAME/A.af.h5 and NAME/B.af.h5.
 build_fields() {
   local name=$1 study=$2 camera
   for camera in A B; do
@@ -121,8 +121,7 @@ IFS=, read -r -a variant_list <<<"$variants"
 IFS=, read -r -a method_list <<<"$methods"
 IFS=, read -r -a pair_method_list <<<"${pair_methods:-$methods}"
 
-# method_options METHOD: sets method_options to the options of af-evaluate, and method_text to the chains that they
-# mean.
+# method_options METHOD: sets method_options to the options for af-evaluate, and method_text to the chains that they mean.
 method_options() {
   local preset similarity optimizer text
   method_options=()
@@ -137,8 +136,8 @@ method_options() {
   method_text="$("$bin/af-evaluate" method "${method_options[@]}")"
 }
 
-# register FOLDER METHOD OPTIONS...: registers the current study, unless it was done with the same options by a method of
-# the same chains.
+# register FOLDER METHOD OPTIONS...: registers the current study, unless a method with the same chains has done so with the
+# same options.
 register() {
   local folder=$1 method=$2 inputs=$stage_inputs
   shift 2
@@ -150,9 +149,9 @@ register() {
   stage_inputs=$inputs
 }
 
-# Every measure with every optimiser that can use it: local ones that need only values in the paper's two passes, those
-# that need derivatives, bobyqa for comparison and the costly cma-es on the pyramid of `fast`. Pattern intensity, which
-# takes seconds a registration, only as the paper would.
+# Every measure is combined with every optimiser that can use it. Local ones that need only values run in the paper's two
+# passes. Those that need derivatives, bobyqa for comparison and the costly cma-es run on the pyramid of `fast`. Pattern
+# intensity takes seconds per registration, so it runs only as in the paper.
 screen_methods() {
   local optimizer needs similarity gradient equations
   while IFS=$'\t' read -r optimizer needs _; do
@@ -217,7 +216,7 @@ for anatomy in "${anatomies[@]}"; do
         done
       fi
     fi
-    # The clean study is made for its fields and starts in any case, but registered only when asked for.
+    # The clean study is always made, for its fields and starts, but registered only when asked for.
     [[ ",$variants," == *",$variant,"* ]] || continue
     [[ "$renderer" != raycast ]] || field_options=()
     for method in "${method_list[@]}"; do

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# A study on this machine, without Slurm: the commands of jobs/submit.sh, one after the other.
+# Runs a study on this machine, without Slurm: the commands of jobs/submit.sh, one after the other.
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
@@ -48,7 +48,7 @@ read_chain
 
 quoted() { (($# == 0)) || printf '%q ' "$@"; }
 
-# list_stage KIND NAME: the line of a stage. Where it holds several words, they are quoted for the shell.
+# list_stage KIND NAME: the line of a stage. Its words are quoted for the shell if there are several.
 list_stage() {
   local ranks=${1}_ranks memory=${1}_memory time=${1}_time result launch=() read_paths=() path parts
   result=$(result_of "${command[@]}")
@@ -83,8 +83,8 @@ mkdir -p "$output"/{fields,registration}
 
 [[ "$restart" == no ]] || forget_progress
 
-# run_stage KIND NAME: runs `command` unless it has been done from the same inputs. The report is always made anew,
-# because that is quick.
+# run_stage KIND NAME: runs `command` unless it has been done with the same inputs. The report is always made anew, because
+# that is quick.
 run_stage() {
   local name=$2
   case "$1" in

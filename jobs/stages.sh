@@ -1,20 +1,20 @@
 # shellcheck shell=bash
 # SPDX-License-Identifier: Apache-2.0
-# Stages of a study: each is one command, and is done again only when what it is made from has changed. Every script of
-# jobs/ that runs several commands sources this file, after lib.sh. jobs/slurm/stage.sbatch sources it alone, because a
-# batch job sees no other file of jobs/; it runs its command itself, and calls nothing below `open_output`.
+# Stages of a study. Each is one command, and is repeated only when its inputs have changed. Every script in jobs/ that runs
+# several commands sources this file, after lib.sh. jobs/slurm/stage.sbatch sources only this file, because a batch job sees
+# no other file of jobs/. It runs its command itself, and calls nothing below `open_output`.
 
-# What the next stage depends on beyond its words; the caller sets it.
+# The inputs of the next stage besides its words. The caller sets them.
 stage_inputs=""
-# yes: every stage depends on all before it, too.
+# yes: every stage also depends on all stages before it.
 stages_are_a_chain=no
 # yes: a new build of the programs makes no difference.
 stages_of_any_build=no
-# yes: a stage whose inputs have changed starts from nothing. no: the program refuses to go on with unfinished work of
-# other options, and says so.
+# yes: a stage whose inputs have changed starts from nothing. no: the program refuses to continue unfinished work with other
+# options, and says so.
 stages_start_anew=no
 
-# stage_key INPUTS COMMAND...: a hash of what a stage is made from.
+# stage_key INPUTS COMMAND...: a hash of a stage's inputs and command.
 stage_key() {
   local program=$2
   [[ "$program" != run_ranks ]] || program=$4
@@ -46,7 +46,7 @@ value_of() {
   done
 }
 
-# result_of COMMAND...: the file that exists when the command has done all of its work.
+# result_of COMMAND...: the file that exists once the command has done all of its work.
 result_of() {
   local output
   output=$(value_of -o "$@")
@@ -54,10 +54,10 @@ result_of() {
   echo "$output"
 }
 
-# progress_of COMMAND...: the folder of its unfinished work.
+# progress_of COMMAND...: the folder of the command's unfinished work.
 progress_of() { echo "$(value_of -o "$@").progress"; }
 
-# bytes_in FOLDER: the size of all files together; 0 when there is none.
+# bytes_in FOLDER: the total size of all files; 0 when there is none.
 bytes_in() { { find "$1" -type f -printf '%s\n' 2>/dev/null || true; } | awk '{sum += $1} END {print sum + 0}'; }
 
 # parts_of PATH: sets parts to the path and, where it is a header, to the voxels beside it.
@@ -66,8 +66,8 @@ parts_of() {
   [[ "$1" != *.mhd && "$1" != *.nhdr ]] || parts=("${1%.*}".*)
 }
 
-# state_of PATH...: name, size and time of a file (also of the voxels beside a header) or of all files of a folder; for
-# a missing file, that it is missing.
+# state_of PATH...: name, size and time of a file (also of the voxels beside a header) or of all files in a folder. For a
+# missing file it says that it is missing.
 state_of() {
   local path parts
   for path in "$@"; do
@@ -76,8 +76,8 @@ state_of() {
   done
 }
 
-# read_by LISTED COMMAND...: sets read_paths to the CT, X-rays, masks and rig of the command's case, and to the fields
-# that it reads. LISTED is what `af-inspect --list-inputs` says of the study.
+# read_by LISTED COMMAND...: sets read_paths to the CT, X-rays, masks and rig of the command's case, and to the fields that
+# it reads. LISTED is what `af-inspect --list-inputs` prints for the study.
 read_by() {
   local listed=$1 case_name name path
   shift
@@ -92,7 +92,7 @@ read_by() {
   done
 }
 
-# inputs_of AF_INSPECT COMMAND...: a hash of the study, and of the state of the other files that the command reads.
+# inputs_of AF_INSPECT COMMAND...: a hash of the study, and of the states of the other files that the command reads.
 inputs_of() {
   local inspect=$1 study listed read_paths
   shift
@@ -102,7 +102,7 @@ inputs_of() {
   { sha256sum <"$study" && state_of "${read_paths[@]}"; } | sha256sum
 }
 
-# set_launch STAGE: sets launch to the words that start the ranks of a stage in a Slurm job, as the resources say.
+# set_launch STAGE: sets launch to the words that start the ranks of a stage in a Slurm job, according to the resources.
 # shellcheck disable=SC2034,SC2154  # the caller reads launch, and has read the resources
 set_launch() {
   case "$launcher-$1" in
@@ -116,7 +116,7 @@ set_launch() {
   esac
 }
 
-# open_output DIR: makes the folder, sets output to its full path and keeps other runs out of it.
+# open_output DIR: makes the folder, sets output to its full path, and locks other runs out of it.
 open_output() {
   mkdir -p "$1/.stages" "$1/logs"
   output="$(cd "$1" && pwd)"
@@ -125,25 +125,25 @@ open_output() {
   trap 'tell_of_stop $?' EXIT
 }
 
-# stage_title: what a stage is called on the screen, if not by its name. stage_report: lines of what was done, and how
+# stage_title: the title of a stage on the screen, if it is not its name. stage_report: lines about what was done, and how
 # long it took.
 stage_title="" current_stage="" stage_report=()
 
-# tell_of_stop STATUS: on the way out.
+# tell_of_stop STATUS: says, on exit, that the stage was stopped.
 tell_of_stop() {
   if (($1 == 130 || $1 == 143)) && [[ -n "$current_stage" ]]; then
     printf '\nStopped in stage "%s". Run the same command again to go on.\n' "$current_stage" >&2
   fi
 }
 
-# forget_stage COMMAND...: removes what another command has made, or begun, in place of this one's output.
+# forget_stage COMMAND...: removes what another command has made, or begun, where this one's output belongs.
 forget_stage() {
   local old
   old=$(value_of -o "$@")
   [[ -z "$old" ]] || rm -rf "$old" "$old.progress" "$old.partial"
 }
 
-# run_logged LOG COMMAND...: its output goes to LOG, below the command, and indented to the screen.
+# run_logged LOG COMMAND...: runs the command. Its output goes to LOG, below the command, and indented to the screen.
 run_logged() {
   local log=$1
   shift
@@ -152,8 +152,8 @@ run_logged() {
   return "${PIPESTATUS[0]}"
 }
 
-# stage NAME RESULT COMMAND...: runs a command unless it made RESULT before with the same words, from the same
-# stage_inputs. An interrupted stage keeps its output, from which the program goes on.
+# stage NAME RESULT COMMAND...: runs a command unless it made RESULT before with the same words and the same stage_inputs.
+# An interrupted stage keeps its output, from which the program continues.
 stage() {
   local title=${stage_title:-$1} name=${1//[\/ ]/-} result=$2 start=$SECONDS status=0 key
   shift 2

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# A study on a Slurm cluster: fields, registrations and report as a chain of jobs.
+# Runs a study on a Slurm cluster: fields, registrations and report as a chain of jobs.
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
@@ -56,7 +56,7 @@ task_state() {
   fi
 }
 
-# print_status: a line for each task: stage, case, state, how often it was queued again, its log.
+# print_status: a line for each task, with stage, case, state, how often it was queued again, and its log.
 print_status() {
   local stage job line task case_name restarts
   [[ -f "$output/jobs/submitted" ]] || die 4 "$output/jobs/submitted: no such file: no chain was submitted there"
@@ -85,7 +85,7 @@ read_chain
 
 # --- the chain ---------------------------------------------------------------------------------------------------
 
-# submit STAGE COMMANDS RANKS MEMORY TIME [DEPENDENCY]: one array task for each line of COMMANDS; sets job_id.
+# submit STAGE COMMANDS RANKS MEMORY TIME [DEPENDENCY]: submits one array task per line of COMMANDS, and sets job_id.
 submit() {
   local stage=$1 commands=$2 ranks=$3 memory=$4 time=$5 dependency=${6:-}
   local command=(sbatch --parsable "--job-name=af-$stage" "--ntasks=$ranks" "--mem-per-cpu=$memory" "--time=$time"
@@ -106,7 +106,7 @@ submit() {
   say "$stage: job $job_id"
 }
 
-# typed FUNCTION [ARGUMENT...]: the command that FUNCTION sets, as a user would type it.
+# typed FUNCTION [ARGUMENT...]: prints the command that FUNCTION sets, as a user would type it.
 typed() {
   local command=()
   "$@"
@@ -114,7 +114,7 @@ typed() {
   printf '\n'
 }
 
-# lines FUNCTION [ARGUMENT]: the commands of FUNCTION CASE [ARGUMENT] for all cases.
+# lines FUNCTION [ARGUMENT]: prints the commands of FUNCTION CASE [ARGUMENT] for all cases.
 lines() {
   local case_name
   for case_name in "${case_names[@]}"; do
@@ -138,14 +138,14 @@ if [[ "$dry_run" == no ]]; then
   cp "$af_root/jobs/stages.sh" "$output/jobs/stages.sh"
 fi
 
-# A case waits for its own fields only (aftercorr: the task of the same number).
+# A case waits only for its own fields: aftercorr means the task of the same number.
 after_fields=""
 for ((view = 0; view < most_views; ++view)); do
   submit "precompute-$((view + 1))" "$(lines precompute_command "$view")" "$precompute_ranks" "$precompute_memory" "$precompute_time"
   after_fields+="${after_fields:+,}aftercorr:$job_id"
 done
 submit evaluate "$(lines evaluate_command)" "$evaluate_ranks" "$evaluate_memory" "$evaluate_time" "$after_fields"
-# The report shows what there is, also when a case failed, and says which cases it has.
+# The report shows what there is even when a case failed, and says which cases it has.
 submit report "$(typed report_command)" 1 "$report_memory" \
   "$report_time" "afterany:$job_id"
 [[ "$dry_run" == yes ]] || say "Watch: squeue --me; or: jobs/submit.sh --status --output $(printf '%q' "$output"); logs: $output/logs; at the end: $output/report.html"

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Tables of pages as small CSVs, from a folder of paper-experiments.sh, population.sh or peers.sh.
+# Writes the tables of pages as small CSVs, from a folder of paper-experiments.sh, population.sh or peers.sh.
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
@@ -30,7 +30,7 @@ mkdir -p "$out"
 add() {
   local target="$out/$1.csv" file="$2" key="${3:-}" value="${4:-}" sum header last
   sum=$(sha256sum "$file" | cut -c1-16)
-  # Tables of a population say themselves which programs made their runs.
+  # Tables of a population already say which programs made their runs.
   if [[ "$(head -n 1 "$file")" == *,commit ]]; then
     header="$(head -n 1 "$file"),source_sha256" last="$sum"
   else

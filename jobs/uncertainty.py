@@ -34,12 +34,12 @@ def number_of(cells, name):
 
 
 def succeeded(cells, views):
-    """By the TRE; by the mRPD with one view, which shows no depth."""
+    """Whether a start succeeded, by the TRE, or with one view by the mRPD, because one view shows no depth."""
     return number_of(cells, "tre_mm" if views > 1 else "mrpd_mm") < SUCCESS_MM
 
 
 class Row:
-    """What is needed of one registration."""
+    """The facts about one registration that are needed here."""
 
     def __init__(self, measure, variant, views, cells):
         def number(name):
@@ -59,7 +59,7 @@ class Row:
         self.fine_mean = number("judge_fine_mean")
         self.excess = number("judge_excess")
         inflation = number("covariance_inflation")
-        self.distance = number("squared_distance") * inflation  # by the sandwich alone
+        self.distance = number("squared_distance") * inflation  # by the sandwich estimate alone
         tre_inflation = number("tre_inflation")
         scale = 1.0 / math.sqrt(tre_inflation) if tre_inflation > 0 else math.nan
         self.tre_rms = number("sandwich_tre_mm")
@@ -73,16 +73,16 @@ class Row:
         self.confidence = 0.0
 
     def kind(self):
-        """Of the patient: the name without its number."""
+        """The kind of patient: the name without its number."""
         return re.sub(r"-\d+$", "", self.patient)
 
     def shortfall(self):
-        """By how much the logarithm of the share that the pose explains falls short of that of EXPLAINED_SHARE."""
+        """How far the logarithm of the share that the pose explains is below that of EXPLAINED_SHARE."""
         return max(0.0, math.log(EXPLAINED_SHARE / min(max(self.fine_mean, LEAST_SHARE), 1.0)))
 
     def features(self):
-        """As in success_confidence(). The distance of a portfolio's ends is none of them: where no portfolio fails it would
-        stand for success."""
+        """The features as in success_confidence(). The distance between a portfolio's ends is not one of them: if no
+        portfolio fails, it would stand for success."""
         in_silhouettes = self.measure == MEASURE_OF["bone"]
         if self.views == 1 and not in_silhouettes:
             return [1.0, self.excess, math.log(max(self.excess / max(self.fine_mean, LEAST_SHARE), LEAST_EXCESS))]
@@ -103,12 +103,12 @@ def weighted_quantile(values, weights, share):
 
 # As in calibration.cpp.
 EXPLAINED_SHARE = 0.65
-# What fit_inflation() tries: a limit to what so few cases may say.
+# The values that fit_inflation() tries. They limit what so few cases may say.
 GROWTHS = [0.05 * i for i in range(161)]
 
 
 def case_weights(rows):
-    """Every case counts the same: starts of one case mostly end at one pose."""
+    """Weights by which every case counts the same, because starts of one case mostly end at one pose."""
     counts = {}
     for row in rows:
         counts[row.case] = counts.get(row.case, 0) + 1
@@ -116,8 +116,8 @@ def case_weights(rows):
 
 
 def fit_inflation(rows, squares, least):
-    """Quantile regression (Koenker and Bassett 1978) of log squares, over those that 95 % should not exceed by the sandwich
-    alone, on the shortfall of what the pose explains, so that 95 % lie inside."""
+    """Quantile regression (Koenker and Bassett 1978) of the logarithms of squares, which 95 % should not exceed by the
+    sandwich estimate alone, on the shortfall of what the pose explains, so that 95 % lie inside."""
     y = [math.log(max(square, 1e-6)) for square in squares]
     x = [row.shortfall() for row in rows]
     weights = case_weights(rows)
@@ -141,7 +141,7 @@ def constants_text(constants):
 
 
 def names_of(measures, views):
-    """Of constants in calibration.cpp: the kind of their rows, and those of the confidence."""
+    """The names of constants in calibration.cpp: the kind of their rows, and the confidence."""
     if measures == [MEASURE_OF["bone"]]:
         return "Silhouettes", "kInSilhouettes"
     return ("OneView", "kOneView") if views == 1 else ("Views", "kOverRegions")
@@ -169,7 +169,7 @@ def probability(coefficients, features):
 
 
 def fit_confidence(rows, ridge=0.05):
-    """Logistic regression by Newton's steps; a small ridge keeps it finite where a line separates."""
+    """Logistic regression by Newton's steps. A small ridge keeps it finite if a line separates the groups."""
     n = len(rows[0].features())
     coefficients = [0.0] * n
     for _ in range(60):
@@ -189,8 +189,8 @@ def fit_confidence(rows, ridge=0.05):
 
 
 def roc_area(groups, times=None):
-    """Area under the ROC curve. `groups`: of rising confidence, the patients of successes and of failures that share it;
-    `times`: how often each patient counts."""
+    """Area under the ROC curve. `groups`, of rising confidence, hold the patients of the successes and of the failures that
+    share it. `times` says how often each patient counts."""
 
     def count(patients):
         return len(patients) if times is None else sum(times[patient] for patient in patients)
@@ -205,8 +205,8 @@ def roc_area(groups, times=None):
 
 
 def roc_interval(rows):
-    """roc_area() and its 95 % interval by percentile bootstrap over patients; draws without failures or successes do not
-    count."""
+    """roc_area() and its 95 % interval by percentile bootstrap over patients. Draws without failures or without successes
+    do not count."""
     by_confidence = {}
     for row in rows:
         by_confidence.setdefault(row.confidence, ([], []))[0 if row.is_success else 1].append(row.patient)
@@ -236,7 +236,7 @@ def coverage(rows, holds):
 
 
 def coverage_interval(rows, holds, draws=2000):
-    """Percentile bootstrap over patients, 95 %, of coverage()."""
+    """The 95 % interval of coverage(), by percentile bootstrap over patients."""
     patients = {}
     for row, weight in zip(rows, case_weights(rows)):
         inside, total = patients.get(row.patient, (0.0, 0.0))
@@ -290,7 +290,7 @@ def summary(label, half, rows):
 
 
 def reliability(rows):
-    """Lines of how many registrations with a confidence within bounds succeeded: of probabilities about as many as it says."""
+    """Lines that say how many registrations within bounds of confidence succeeded. A true probability foretells their share."""
     bounds = [0.0, 0.1, 0.5, 0.9, 0.99, 1.0]
     lines = []
     for low, high in zip(bounds, bounds[1:]):
@@ -303,14 +303,14 @@ def reliability(rows):
 
 
 def fitted_constants(rows, measures, which="drawn, in the other folds"):
-    """Those of the covariance and of TREs by measure, and those of the confidence, that fit these rows."""
+    """The constants that fit these rows: by measure for the covariance and for TREs, and those of the confidence."""
     inflations = {}
     for measure in measures:
         fitted = [r for r in rows if r.measure == measure and r.is_success and not math.isnan(r.distance)]
         if not fitted:
             refuse(measure, f"no registration of a patient to fit ({which}) succeeded and says how far it may be off; --judge fits nothing")
-        # Never less than the sandwich itself, which holds where the pose explains the X-rays. A TRE adds up what all six
-        # directions do, and may be foretold too large.
+        # The inflation is never below the sandwich estimate itself, which holds if the pose explains the X-rays. A TRE adds
+        # up what all six directions do, so its prediction may be too large.
         pose = fit_inflation(fitted, [row.distance / REGION_95 for row in fitted], 0.0)
         tre = fit_inflation(fitted, [(row.tre / row.tre_95) ** 2 for row in fitted], -math.inf)
         inflations[measure] = (pose, tre)
@@ -318,7 +318,7 @@ def fitted_constants(rows, measures, which="drawn, in the other folds"):
 
 
 def print_constants(constants, views):
-    """As lines of calibration.cpp."""
+    """Prints the constants as lines of calibration.cpp."""
     inflations, coefficients = constants
     evidence, confidence = names_of(list(inflations), views)
     for measure, (pose, tre) in inflations.items():
@@ -334,7 +334,7 @@ def foretell(rows, constants):
         if row.has_pose:
             row.inflation = inflation_of(row, pose)
             row.tre_inflation = inflation_of(row, tre)
-        # Where the search failed there is no end, whatever the constants.
+        # A failed search has no end, whatever the constants.
         if row.has_confidence and row.stated_confidence != 0.0:
             row.confidence = probability(coefficients, row.features())
 
@@ -346,7 +346,7 @@ def fit_to_odd_half(rows, measures):
 
 
 def folds_of(kinds, folds):
-    """The fold of every patient, given their kinds."""
+    """The fold of every patient. `kinds` gives their kinds."""
     ranks, fold_of = {}, {}
     for patient in sorted(kinds):
         ranks[kinds[patient]] = ranks.get(kinds[patient], -1) + 1
@@ -355,8 +355,8 @@ def folds_of(kinds, folds):
 
 
 def cross_validate(rows, measures, folds):
-    """Prints the constants that fit all drawn patients. Each of them is foretold by those of the others: every fold has as
-    many patients of every kind; patients that were not drawn are foretold by the constants of all."""
+    """Prints the constants that fit all drawn patients. Each patient is predicted by the constants of the other folds;
+    every fold has as many patients of every kind. Patients that were not drawn are predicted by the constants of all."""
     drawn = [row for row in rows if row.number is not None]
     constants = fitted_constants(drawn, measures)
     print_constants(constants, rows[0].views)
@@ -416,7 +416,7 @@ def refuse(what, why):
 
 
 def cells_of(path, columns):
-    """The lines of a table of registrations, as dictionaries; refused are tables without one of the columns, and cut ones."""
+    """The lines of a table of registrations, as dictionaries. Refuses truncated tables and those that lack a column."""
     with open(path, newline="", encoding="utf-8") as file:
         table = csv.DictReader(file)
         missing = [column for column in columns if column not in (table.fieldnames or [])]
@@ -437,13 +437,13 @@ def rows_of(path, measure, variant, views):
 
 
 def finished_tables(population, condition):
-    """Tables of finished runs of one machine, and of a cluster."""
+    """The tables of finished runs, on one machine and on a cluster."""
     runs = [*population.glob(f"runs/{condition}/*"), *population.glob(f"slurm/{condition}/registration/*")]
     return [run / "registrations.csv" for run in sorted(runs) if (run / "summary.json").exists()]
 
 
 def rows_of_populations(chosen):
-    """All registrations of all folders, and the SHA-256 of their tables; a patient may be in one of them alone."""
+    """All registrations in all folders, and the SHA-256 of their tables. A patient may be in only one folder."""
     rows, seen, digest = [], {}, hashlib.sha256()
     for preset in chosen.presets:
         for variant in chosen.variants:
@@ -463,8 +463,8 @@ def rows_of_populations(chosen):
 
 
 def tables_of(rows, measures, halves):
-    """How well predictions hold: of every half and measure; of those judged also of every variant of X-rays, of every
-    measure on each, and of every kind of patients."""
+    """How well predictions hold, for every half and measure. For the judged half also for every variant of X-rays, every
+    measure on each, and every kind of patient."""
     table = [
         summary(label, half, [r for r in rows if r.is_for_fit == is_for_fit and label in ("all", r.measure)])
         for half, is_for_fit in halves.items()
@@ -481,7 +481,7 @@ def tables_of(rows, measures, halves):
 
 
 def tables_of_halves(rows, measures):
-    """The same as stated, of each half alone, and of every kind of patients in it."""
+    """The same for the stated predictions, for each half alone and every kind of patient in it."""
     table = []
     for half in dict.fromkeys(row.half for row in rows):
         mine = [row for row in rows if row.half == half]
@@ -493,7 +493,7 @@ def tables_of_halves(rows, measures):
 
 
 def write_csv(path, table, origin):
-    """`origin`: last cells of every row."""
+    """Writes the table. `origin` holds the last cells of every row."""
     with open(path, "w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, [*table[0], *origin], lineterminator="\n")
         writer.writeheader()

@@ -16,7 +16,7 @@ COLUMNS = ["case", "tre_mm", "mrpd_mm", "verdict", "predicted_tre_95_mm"]
 
 
 class End:
-    """What is needed of one registration."""
+    """The facts about one registration that are needed here."""
 
     def __init__(self, views, cells):
         self.verdict = cells["verdict"]
@@ -64,8 +64,8 @@ def verdict_line(name, pairs):
     right = [end for end in ends if end.is_right]
     wrong = [end for end in ends if not end.is_right]
 
-    def count(of, verdict):
-        return sum(end.verdict == verdict for end in of)
+    def count(chosen, verdict):
+        return sum(end.verdict == verdict for end in chosen)
 
     pairs_found = sum(any(end.verdict == "found" for end in pair) for pair in pairs)
     pairs_wrong = sum(any(end.verdict == "found" and not end.is_right for end in pair) for pair in pairs)
@@ -76,7 +76,7 @@ def verdict_line(name, pairs):
 
 
 def bound_line(name, pairs):
-    """By pair: of its right ends with a bound the median, as most of them lie together."""
+    """A line over pairs. A pair counts by the median of its right ends with a bound, as most of them lie together."""
     known = []
     for pair in pairs:
         ends = [end for end in pair if end.is_right and not math.isnan(end.bound_mm)]

@@ -16,8 +16,8 @@ struct Ct::Impl {
   CtGrid grid;
   std::vector<std::string> warnings;
 
-  /// The attenuation by a model; one that exists already is shared, as by the casters of two
-  /// cameras.
+  /// The attenuation by a model. One that exists already is shared, for example by the casters of
+  /// two cameras.
   [[nodiscard]] std::shared_ptr<const af::AttenuationVolume> attenuation(
       const af::AttenuationModel& model) const;
 

@@ -23,7 +23,7 @@ FileError::FileError(const std::string& message)
 NumericError::NumericError(const std::string& message)
     : Error(message, static_cast<int>(af::ExitCode::Numeric)) {}
 
-// Here, so that there is one type information of each, in this library.
+// Defined here, so that each has one type information, in this library.
 Error::~Error() = default;
 InputError::~InputError() = default;
 FileError::~FileError() = default;
@@ -38,7 +38,7 @@ std::string version() {
 namespace af::library {
 namespace {
 
-/// What this library calls an option of the programs; empty for those that it does not have.
+/// What this library calls an option of the programs. Empty for those that it does not have.
 std::string_view name_of_option(std::string_view option) {
   struct Option {
     std::string_view of_programs;
@@ -72,7 +72,7 @@ std::string_view name_of_option(std::string_view option) {
   return found == std::end(kOptions) ? std::string_view() : found->here;
 }
 
-/// ` LAT=FIELD.h5`, the value of --field at the beginning of `text`, which loses it, as
+/// Takes ` LAT=FIELD.h5`, the value of --field, from the beginning of `text`, and returns it as
 /// `={"LAT": "FIELD.h5"}`.
 std::string map_value(std::string_view& text) {
   const std::size_t middle = text.find('=');
@@ -84,8 +84,8 @@ std::string map_value(std::string_view& text) {
   return value;
 }
 
-/// The text with the library's names in the place of "--option". Options that it does not have
-/// stay: they are advice to use a program.
+/// The text with the library's names in place of "--option". Options that the library does not have
+/// stay, because they are advice to use a program.
 std::string in_names_of_library(std::string_view text) {
   constexpr std::string_view kLetters = "abcdefghijklmnopqrstuvwxyz-";
   std::string result;

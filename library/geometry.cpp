@@ -14,7 +14,7 @@ namespace {
 using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 using RowMajor4 = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
 
-/// From orthonormal: what rigidity_problems() tolerates.
+/// Deviation from orthonormal that rigidity_problems() tolerates.
 constexpr double kRotationTolerance = 1e-5;
 
 CameraGeometry geometry_of(const api::Camera& camera) {
@@ -90,7 +90,7 @@ PoseFrame checked_frame(const api::PoseFrame& frame) {
   result.center_room_mm = vector_of(frame.center_room_mm);
   const Eigen::Matrix3d gram = result.rotation.transpose() * result.rotation;
   const double error = (gram - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-  // Written so that NaN is refused.
+  // NaN fails the comparison, and is refused.
   if (!(error <= kRotationTolerance && result.rotation.determinant() > 0.0))
     throw InputError("frame: rotation = not a rotation: must be orthonormal, right-handed");
   if (!(result.center_ct_mm.allFinite() && result.center_room_mm.allFinite()))

@@ -101,7 +101,8 @@ registration::CaseLoadOptions load_options(const RegistrationOptions& options,
   return result;
 }
 
-/// InputError unless there is a value for every pixel of the camera.
+/// The image of these pixels. Throws InputError unless there is a value for every pixel of the
+/// camera.
 af::Image2d whole_detector(const af::CameraGeometry& camera, std::span<const float> pixels) {
   af::Image2d image(camera.size_px.x(), camera.size_px.y());
   if (pixels.size() != image.pixels.size())
@@ -137,13 +138,13 @@ struct RegistrationCase::Impl {
   std::optional<registration::Registration> registration;
   af::ForkAwareMutex mutex;  ///< of registration and xray_readers
 
-  /// The problem at hand, also while a registration runs.
+  /// The current problem. May be called while a registration runs.
   [[nodiscard]] std::shared_ptr<const registration::RegistrationProblem> problem() const {
     const std::lock_guard lock(problem_mutex_);
     return problem_;
   }
 
-  /// From now on registers a problem; leaves all as it is where that cannot be registered.
+  /// Registers this problem from now on. Leaves everything as it is if it cannot be registered.
   void use(const std::shared_ptr<const registration::RegistrationProblem>& problem,
            const registration::RegistrationOptions& method) {
     registration::Registration made(problem, method, pool);
@@ -158,7 +159,7 @@ struct RegistrationCase::Impl {
     return af::mean_tre_mm(pose, gold->room_from_ct, target_points);
   }
 
-  /// `is_diagnosed`: X-rays that do not fit are looked into, as af-register does for its best end.
+  /// `is_diagnosed`: looks into X-rays that do not fit, as af-register does for its best end.
   Registration run(const af::RigidTransform& start, std::int64_t start_index, bool is_diagnosed) {
     registration::RegistrationRecord record = registration->run(start, start_index);
     if (is_diagnosed) registration->diagnose(record);

@@ -45,15 +45,16 @@ void require_size(const char* name, std::size_t found, std::size_t expected) {
         name, std::to_string(found) + " values", "must have room for " + std::to_string(expected));
 }
 
-/// None for one thread: then renderers need no turns.
+/// None for one thread, so that renderers need no turns.
 std::shared_ptr<af::ThreadPool> pool_of(int threads) {
   af::throw_if_any(af::thread_problems(threads));
   const int count = af::thread_count(threads);
   return count > 1 ? std::make_shared<af::ThreadPool>(count) : nullptr;
 }
 
-/// From derivatives by small motions about r + t (per rad, per mm) to those by the six pose
-/// parameters (per degree, per mm), in place. Translations are their own motions.
+/// Turns derivatives with respect to small motions about r + t (per rad, per mm) into those with
+/// respect to the six pose parameters (per degree, per mm), in place. Translations are their own
+/// motions.
 void by_parameters(const std::array<double, 6>& parameters, std::span<float> planes) {
   const auto motions = af::motions_from_parameters(af::PoseParameters::from_deg_and_mm(parameters));
   const std::size_t pixels = planes.size() / kPlanes;
@@ -84,7 +85,7 @@ struct Renderer::Impl {
   std::shared_ptr<const af::DrrRenderer> renderer;
   af::View view;
   af::PoseFrame frame;
-  std::shared_ptr<af::ThreadPool> pool;  ///< none: one thread
+  std::shared_ptr<af::ThreadPool> pool;  ///< none for one thread
   Outside outside = Outside::Throw;
   Camera camera;
   PoseFrame public_frame;
@@ -102,7 +103,7 @@ struct Renderer::Impl {
         camera(library::camera_of(geometry)),
         public_frame(library::frame_of(pose_frame)) {}
 
-  /// One DRR with scratch memory that is kept for the next.
+  /// Makes one DRR, with scratch memory that is kept for the next.
   std::int64_t render(const af::RigidTransform& pose,
                       std::size_t number,
                       std::span<float> total_attenuation,
@@ -131,7 +132,7 @@ struct Renderer::Impl {
     return rays_outside;
   }
 
-  /// Calls work(i) for [0, count), on all threads, and adds what it returns.
+  /// Calls work(i) for [0, count), on all threads, and adds up what it returns.
   template <typename Work>
   std::int64_t sum_over(std::size_t count, const Work& work) const {
     std::vector<std::int64_t> parts(count);
@@ -148,7 +149,7 @@ struct Renderer::Impl {
     return sum;
   }
 
-  /// A single DRR: its rows are what the threads share.
+  /// Makes a single DRR, whose rows the threads share.
   template <typename Work>
   std::int64_t in_turn(const Work& work) const {
     if (!pool) return work();
@@ -174,7 +175,7 @@ struct Renderer::Impl {
     workspaces_.push_back(std::move(workspace));
   }
 
-  mutable af::ForkAwareMutex pool_mutex_;  ///< one thread from outside at a time may use the pool
+  mutable af::ForkAwareMutex pool_mutex_;  ///< callers take turns with the pool
   mutable af::ForkAwareMutex workspace_mutex_;
   mutable std::vector<std::unique_ptr<af::RenderWorkspace>> workspaces_;
 };
@@ -269,7 +270,7 @@ std::int64_t Renderer::drrs_and_gradients(std::span<const std::array<double, 6>>
 
 namespace {
 
-/// A field's renderer, or that of an atlas's fields, of a beam; as af-drr makes it.
+/// A renderer of a field, or of an atlas's fields, for a beam, as af-drr makes it.
 std::shared_ptr<const af::DrrRenderer> renderer_of(const af::OpenedField& opened,
                                                    const std::string& look_up,
                                                    const af::XrayBeamOptions& options,

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Between the library's types, which include nothing but the standard library, and the programs'.
+// Translates between the library's types, which include only the standard library, and the
+// programs'.
 #pragma once
 
 #include <string>
@@ -20,16 +21,16 @@ namespace api = attenuation_fields;
 
 Eigen::Vector3d vector_of(const api::Vector3& values);
 api::Vector3 vector_of(const Eigen::Vector3d& vector);
-/// InputError naming `name` when the matrix is not rigid; one that is keeps its bits.
+/// Throws InputError naming `name` when the matrix is not rigid. A rigid one keeps its bits.
 RigidTransform transform_of(const api::Pose& pose, const std::string& name);
 api::Pose pose_of(const RigidTransform& transform);
-/// InputError when the camera has problems.
+/// Throws InputError when the camera has problems.
 CameraGeometry checked_camera(const api::Camera& camera);
 api::Camera camera_of(const CameraGeometry& camera);
-/// InputError when the rotation is none.
+/// Throws InputError when the rotation is not a rotation.
 PoseFrame checked_frame(const api::PoseFrame& frame);
 api::PoseFrame frame_of(const PoseFrame& frame);
-/// InputError when it has problems.
+/// Throws InputError when the beam has problems.
 XrayBeamOptions checked_beam(const api::Beam& beam);
 CtGrid grid_of(const api::CtGrid& grid);
 api::CtGrid grid_of(const CtGrid& grid);
@@ -37,7 +38,7 @@ api::CtGrid grid_of(const CtGrid& grid);
 /// Throws the error that is being handled as one of the library's, with its text.
 [[noreturn]] void throw_translated();
 
-/// Runs `function`; errors leave it as the library's.
+/// Runs `function`. Errors leave it as the library's.
 template <typename Function>
 std::invoke_result_t<Function> translated(Function&& function) {
   try {
@@ -47,7 +48,7 @@ std::invoke_result_t<Function> translated(Function&& function) {
   }
 }
 
-/// The same, alone in this process.
+/// The same, while no other thread of this process does so.
 template <typename Function>
 std::invoke_result_t<Function> translated_reading(Function&& function) {
   return translated([&] {

@@ -30,7 +30,7 @@ void require_something_seen(const CastPhase& cast, const SizedField& field) {
                    "the CT is within the range; check the rig, the nominal pose and the centre");
 }
 
-/// Collective. Without a filter.
+/// Collective. Trains without a filter.
 TrainedField train(const FieldBuild& build,
                    DecidingValues decides,
                    const SizedField& field,

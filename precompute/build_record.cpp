@@ -85,7 +85,7 @@ std::string filter_text(const FittedFilter& fitted, float step) {
   return text.str();
 }
 
-/// Mean over largest: 1 when all ranks were equally long at work.
+/// Mean divided by largest. It is 1 when all ranks worked equally long.
 double balance_of(const std::vector<double>& seconds) {
   const double largest = *std::max_element(seconds.begin(), seconds.end());
   if (!(largest > 0.0)) return 1.0;

@@ -8,9 +8,9 @@
 
 namespace af {
 
-/// Everything the cast samples depend on; exact, but for what may follow from the CT's grid. A
-/// resumed run reuses finished units only if all of this is unchanged. Codebook options may change
-/// between a stop and its resume, for example after "more codewords than training tiles".
+/// Everything on which the cast samples depend, exact except for what may follow from the CT's
+/// grid. A resumed run reuses finished units only if all of this is unchanged. Codebook options may
+/// change between a stop and its resume, for example after "more codewords than training tiles".
 DecidingValues cast_dependencies(const PrecomputeOptions& options,
                                  const FieldSource& source,
                                  const std::vector<FieldPart>& parts);

@@ -13,7 +13,7 @@ namespace af {
 
 namespace {
 
-/// Look-ups and sizes of the codebook that are worth a point of the model.
+/// Look-ups and codebook sizes that deserve a point of the model.
 std::vector<DesignPoint> points_of(const DesignMeasurement& measured, const DesignParts& stated) {
   std::vector<DesignPoint> points;
   for (const auto& [codewords, bytes] : measured.bytes_per_tile)

@@ -29,7 +29,7 @@ struct DryRun {
   SpeedSample speed;  ///< of one rank
   DiskSample disk;    ///< of the folder that holds unfinished work
   MemoryPlan memory;
-  PhaseSeconds past;  ///< phases that a dry run goes through itself: reading and resampling
+  PhaseSeconds past;  ///< phases that a dry run itself goes through: reading and resampling
   int ranks = 1;
 };
 
@@ -39,9 +39,9 @@ struct FieldForecast {
   std::uint64_t cropped_bytes = 0;                  ///< stored nodes at 16 bits
   std::uint64_t payload_bytes = 0;                  ///< indices and codebook
   std::uint64_t file_bytes = 0;                     ///< about: empty tiles compress away
-  std::uint64_t tile_bytes = 0;                     ///< of tiles that are not empty, over all ranks
-  std::uint64_t kept_bytes = 0;                     ///< of them in memory
-  TileOverflow overflow = TileOverflow::CastAgain;  ///< of the rest
+  std::uint64_t tile_bytes = 0;                     ///< tiles that are not empty, over all ranks
+  std::uint64_t kept_bytes = 0;                     ///< how many of them stay in memory
+  TileOverflow overflow = TileOverflow::CastAgain;  ///< for the rest
   std::uint64_t limit_bytes = 0;                    ///< of memory, per rank
   std::uint64_t bytes_per_rank = 0;
   PhaseSeconds seconds;
@@ -53,11 +53,11 @@ struct FieldForecast {
   }
 };
 
-/// Tiles of a field and how many are worked on.
+/// Tiles of a field, and how many are worked on.
 struct TileCounts {
   double all = 0.0;
   double occupied = 0.0;
-  double training = 0.0;  ///< with those held out
+  double training = 0.0;  ///< including those held out
 
   TileCounts(const DryRun& run)
       : all(static_cast<double>(run.field.lattice.tile_count())),
@@ -71,7 +71,7 @@ struct TileCounts {
   }
 };
 
-/// Of indices and means, where there are any.
+/// Bytes of indices and, if there are any, means.
 double bytes_per_tile(const PrecomputeOptions& options) {
   return options.design().mean_step > 0 ? 4.0 : 2.0;
 }
@@ -103,7 +103,7 @@ void forecast_seconds(const DryRun& run, const TileCounts& tiles, FieldForecast&
   const double checkpoint_seconds = run.field.options.has_checkpoint
                                         ? seconds_at(tile_bytes, run.disk.write_bytes_per_second)
                                         : 0.0;
-  // Most trainings end after about so many iterations.
+  // Most trainings end after about this many iterations.
   constexpr double kIterations = 10.0;
   const double overflow_fraction =
       tile_bytes > 0.0 ? 1.0 - static_cast<double>(need.kept_bytes) / tile_bytes : 0.0;
@@ -113,7 +113,7 @@ void forecast_seconds(const DryRun& run, const TileCounts& tiles, FieldForecast&
           : overflow_fraction * cast_seconds;
   const double index_bytes = bytes_per_tile(run.field.options) * tiles.occupied;
   const double compress_seconds = index_bytes * speed.compress_seconds_per_byte;
-  // The file is read back: decoding takes as long as coding, SHA-256 some 2 ns a byte.
+  // The file is read back. Decoding takes as long as coding, and SHA-256 some 2 ns per byte.
   const double verify_seconds =
       compress_seconds + 2e-9 * bytes_per_tile(run.field.options) * tiles.all;
   const double verifying_ranks =
@@ -158,7 +158,7 @@ std::string planes_text(const LightSlab& planes) {
   return text;
 }
 
-/// The members of an atlas.
+/// Describes the members of an atlas.
 std::string parts_text(const std::vector<FieldPart>& parts) {
   const std::string names =
       joined(parts, ", ", [](const FieldPart& part) { return part.source.camera.name; });
@@ -166,7 +166,7 @@ std::string parts_text(const std::vector<FieldPart>& parts) {
          "; each for at least " + parts.front().range.text() + "\n";
 }
 
-/// What other options would give.
+/// Says what other options would give.
 std::string advice_text(const FieldPart& part, const PrecomputeOptions& options) {
   const FieldSource& source = part.source;
   const LightSlab& planes = part.light_slab;
@@ -297,7 +297,7 @@ void print_dry_run(const SizedField& field, const FieldCaster& caster, const Pre
   std::vector<WorkUnit> units = plan_units(field.lattice, plan);
   const MemoryPlan memory = memory_plan(field, units, run);
   do_on_root(run.world, [&] {
-    // The units that are cast to measure the speed.
+    // These are the units that are cast to measure the speed.
     const PlanOptions small = caster_named(field.options.caster).sample;
     const PlanOptions sample = small.rays_per_unit < plan.rays_per_unit ? small : plan;
     const SpeedSample speed =

@@ -7,8 +7,8 @@
 
 namespace af {
 
-/// Collective. Prints what making the field would need: sizes, units, memory, ratios, time, advice;
-/// from short samples of the work on rank 0. InputError when the memory limit is too low.
+/// Collective. Prints what making the field would need: sizes, units, memory, ratios, time, advice,
+/// from short samples of the work on rank 0. Throws InputError when the memory limit is too low.
 void print_dry_run(const SizedField& field, const FieldCaster& caster, const PrecomputeRun& run);
 
 }  // namespace af

@@ -10,13 +10,13 @@ namespace af {
 
 MpiIoHints mpi_io_hints(const PrecomputeOptions& options);
 
-/// Collective. Checks the output before the work, not after it. FileError and InputError as
-/// RunFolder::open() and check_parallel_writing().
+/// Collective. Checks the output before the work instead of after it. Throws as RunFolder::open()
+/// and check_parallel_writing() do.
 void open_output(const PrecomputeOptions& options, PrecomputeRun& run);
 
 /// Collective. Encodes the tiles and writes the file, a field or an atlas, in turns, so that no
-/// rank holds more than a round of indices; then nothing is unfinished, and the terminal is told
-/// what was made. Errors of FieldEncoder and write_field().
+/// rank holds more than a round of indices. Then nothing is unfinished, and the terminal shows what
+/// was made. Throws as FieldEncoder and write_field() do.
 void write_encoded(const FieldBuild& build,
                    const SizedField& field,
                    CastPhase& cast,

@@ -20,8 +20,8 @@ namespace af {
 
 namespace {
 
-/// What tells a part from the others, as rank 0 derived it: trigonometry may differ in its last bit
-/// between processors.
+/// What distinguishes a part from the others, as rank 0 derived it, because trigonometry may differ
+/// in its last bit between processors.
 struct PartKey {
   CameraGeometry camera;
   MotionRange range;
@@ -34,7 +34,7 @@ struct PartKey {
 
 std::vector<PartKey> keys_of_orbit(const FieldSource& source, const PrecomputeOptions& options) {
   Orbit orbit = orbit_of_text("--orbit", options.orbit);
-  // If the rays of stationary cameras count, too, sources are scattered widely.
+  // If the rays of stationary cameras count too, sources are scattered widely.
   if (!source.more_cameras.empty()) orbit.members_by = Orbit::MembersBy::Pose;
   std::vector<PartKey> keys;
   for (OrbitMember& member :
@@ -44,7 +44,7 @@ std::vector<PartKey> keys_of_orbit(const FieldSource& source, const PrecomputeOp
   return keys;
 }
 
-/// The camera, and those of the rig that bear other names.
+/// The camera, and those of the rig with other names.
 std::vector<CameraGeometry> listed_cameras(const FieldSource& source,
                                            const std::string& path,
                                            const CameraRig& rig) {
@@ -89,7 +89,7 @@ std::shared_ptr<const SlabAlignedVolume> resampled_on_node(const AttenuationVolu
       });
 }
 
-/// Of line integrals of the part's CT, with what measured X-rays show beyond it.
+/// A caster of line integrals of the part's CT, plus what measured X-rays show beyond it.
 std::unique_ptr<const FieldCaster> line_integral_caster(const FieldPart& part,
                                                         const LightSlab& planes,
                                                         const PrecomputeOptions& options) {
@@ -175,15 +175,15 @@ std::vector<double> costs_over_parts(const std::vector<WorkUnit>& units,
   const std::vector<SlabPlace> places = slab_places(slab_counts(parts));
   std::vector<double> costs;
   costs.reserve(units.size());
-  // The units of a part stand together, as its slabs do.
+  // The units of a part are consecutive, as its slabs are.
   for (std::size_t first = 0; first < units.size();) {
-    const std::size_t of = places.at(units[first].slab).field;
+    const std::size_t field = places.at(units[first].slab).field;
     std::vector<WorkUnit> of_part;
-    for (; first < units.size() && places.at(units[first].slab).field == of; ++first) {
+    for (; first < units.size() && places.at(units[first].slab).field == field; ++first) {
       of_part.push_back(units[first]);
       of_part.back().slab = places[units[first].slab].slab;
     }
-    const FieldPart& part = parts[of];
+    const FieldPart& part = parts[field];
     const std::vector<double> its_costs =
         unit_costs(of_part, part.light_slab, part.source.volume->corner_points());
     costs.insert(costs.end(), its_costs.begin(), its_costs.end());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The fields that af-precompute makes: one field or the members of an atlas, each with its planes
-// and the CT along their axes, and one caster for all.
+// The fields that af-precompute makes: one field or the members of an atlas. Each has its planes
+// and the CT along their axes. One caster serves all.
 #pragma once
 
 #include <memory>
@@ -24,17 +24,17 @@ struct FieldPart {
   MotionRange range;   ///< about the nominal pose; the field holds all of it
   LightSlab light_slab;
   std::shared_ptr<const SlabAlignedVolume> resampled;  ///< for casters that need it
-  DepthSlabs depth_slabs = {{}, {0.0}};                ///< at first one through the centre
+  DepthSlabs depth_slabs = {{}, {0.0}};                ///< at first one, through the centre
 };
 
-/// Collective. The field of the options, or the members of their atlas; without planes. The same on
-/// every rank. InputError when the orbit or the list of cameras makes no atlas.
+/// Collective. The field of the options, or the members of their atlas, without planes. The same on
+/// every rank. Throws InputError when the orbit or the list of cameras makes no atlas.
 std::vector<FieldPart> field_parts(const FieldSource& source,
                                    const PrecomputeOptions& options,
                                    const Communicator& communicator);
 
-/// Collective. Every part, its planes known, with the CT in its slab frame, held once per node; the
-/// ranks of a node share the work.
+/// Collective. Every part, whose planes are known, with the CT in its slab frame, held once per
+/// node. The ranks of a node share the work.
 std::vector<FieldPart> with_resampled_ct(std::vector<FieldPart> parts,
                                          WorkNote& note,
                                          const Communicator& communicator);
@@ -46,7 +46,7 @@ FieldLattice lattice_of(const std::vector<FieldPart>& parts);
 std::unique_ptr<const FieldCaster> make_caster(const std::vector<FieldPart>& parts,
                                                const PrecomputeOptions& options);
 
-/// unit_costs() of units of all slabs.
+/// unit_costs() for units of all slabs.
 std::vector<double> costs_over_parts(const std::vector<WorkUnit>& units,
                                      const std::vector<FieldPart>& parts);
 

@@ -23,23 +23,23 @@ namespace af {
 struct FieldSource {
   std::shared_ptr<const AttenuationVolume> volume;
   std::string ct_path;
-  CtReadOptions ct_reading;  ///< typed, or the study's
+  CtReadOptions ct_reading;  ///< as typed, or the study's
   CtIdentity ct;
   CameraGeometry camera;
   PoseFrame frame;
   Eigen::Vector3d isocenter_point = Eigen::Vector3d::Zero();  ///< of the rig
-  MotionRange range;                         ///< about the nominal pose: of the options
+  MotionRange range;                         ///< about the nominal pose, from the options
   std::vector<HalfSpace> sources;            ///< which of its poses to hold: LightSlabSpec::sources
-  std::vector<CameraGeometry> more_cameras;  ///< whose rays the field holds, too
-  std::shared_ptr<const MeasuredViews> projections;  ///< that correct the field; null: none
+  std::vector<CameraGeometry> more_cameras;  ///< whose rays the field holds too
+  std::shared_ptr<const MeasuredViews> projections;  ///< for correcting the field; null: none
 
   [[nodiscard]] AttenuationQuantizer quantizer() const {
     return AttenuationQuantizer::for_maximum(volume->max_total_attenuation());
   }
 };
 
-/// Collective. Reads what the options name, and tells the terminal of what it met. UsageError when
-/// they name too little; InputError and FileError as the readers.
+/// Collective. Reads what the options name, and prints remarks about it. Throws UsageError when
+/// they name too little, and as the readers do.
 FieldSource load_source(const PrecomputeOptions& options, const Communicator& communicator);
 
 }  // namespace af

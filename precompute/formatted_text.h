@@ -9,7 +9,7 @@
 
 namespace af {
 
-/// As std::snprintf(), up to 511 bytes.
+/// Like std::snprintf(), up to 511 bytes.
 template <typename... Values>
 std::string formatted(const char* format, Values... values) {
   std::array<char, 512> text{};

@@ -6,7 +6,7 @@
 #include "cli/run_limits.h"
 #include "precompute/precompute_field.h"
 
-// Outside app_main only the declaration of options can throw, which is a defect of this program.
+// Outside app_main only the declaration of options can throw, and that would be a defect.
 // NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
   af::PrecomputeOptions options;

@@ -60,7 +60,7 @@ std::vector<std::size_t> pixel_places(const std::vector<CameraGeometry>& cameras
   return places;
 }
 
-/// Line integrals of one view; NaN where a mask hides them.
+/// Line integrals of one view. NaN where a mask hides them.
 void read_measured(const StudyView& view,
                    const CameraGeometry& camera,
                    std::span<float> values,
@@ -114,8 +114,8 @@ void smooth(const CameraGeometry& camera,
   std::copy(image.pixels.begin(), image.pixels.end(), smoothed.begin());
 }
 
-/// The mean over the views of what each pixel holds beyond the CT; 0 where no view was measured.
-/// InputError when the views are not of one size.
+/// The mean over the views of what each pixel holds beyond the CT. 0 where no view was measured.
+/// Throws InputError when the views differ in size.
 std::vector<float> common_part(const std::vector<CameraGeometry>& cameras,
                                std::span<const float> measured,
                                std::span<const float> residual,
@@ -155,7 +155,7 @@ std::shared_ptr<const std::byte> without_common_part(const std::vector<CameraGeo
   });
 }
 
-/// Root mean squares of measured and residual, not smoothed yet, where the CT attenuates: elsewhere
+/// Root mean squares of measured and residual, not smoothed yet, where the CT attenuates. Elsewhere
 /// they are the same, and nothing is corrected.
 void note_rms(std::span<const float> measured,
               std::span<const float> residual,
@@ -187,7 +187,8 @@ void require_same_object(const MeasuredViews& found) {
       found.path);
 }
 
-/// The views that look at the CT from the camera's side; all for an atlas, whose cameras go round.
+/// The views that look at the CT from the camera's side. For an atlas, whose cameras go round, all
+/// views.
 std::vector<StudyView> views_from_side(const Study& study,
                                        const StudyCase& study_case,
                                        const PrecomputeOptions& options,
@@ -201,7 +202,7 @@ std::vector<StudyView> views_from_side(const Study& study,
   return chosen;
 }
 
-/// Collective. The line integrals of the views, one behind the other, once per node.
+/// Collective. The line integrals of the views, one after the other, once per node.
 std::shared_ptr<const std::byte> read_on_root(const std::vector<StudyView>& views,
                                               const std::vector<CameraGeometry>& cameras,
                                               const std::vector<std::size_t>& places,

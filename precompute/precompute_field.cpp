@@ -25,7 +25,7 @@ namespace {
 /// Collective.
 PrecomputeOptions options_in_force(const PrecomputeOptions& stated, const Communicator& world) {
   return all_or_none(world, [&] {
-    // As stated first: what is in force has known names alone.
+    // The stated options are checked first, because only known names are in force.
     throw_if_any(problems(stated));
     PrecomputeOptions options = stated.in_force();
     throw_if_any(problems(options));
@@ -35,13 +35,13 @@ PrecomputeOptions options_in_force(const PrecomputeOptions& stated, const Commun
   });
 }
 
-/// Collective. From the CT to the planes that rays are cast between.
+/// Collective. From the CT to the planes between which rays are cast.
 SizedField sized_field(const PrecomputeOptions& options, PrecomputeRun& run) {
   const Communicator& world = run.world;
   WorkNote note("reading the CT", WorkNote::Kind::Phase);
   const FieldSource source = load_source(options, world);
-  // As one central slab first: resampling needs the slab frame alone, and cutting the CT into
-  // slabs needs the resampled CT.
+  // At first there is one central slab: resampling needs only the slab frame, and cutting the CT
+  // into slabs needs the resampled CT.
   std::vector<FieldPart> central = with_planes(field_parts(source, options, world), options, world);
   run.clock.end("read");
   if (!needs_resampled_ct(options))

@@ -8,8 +8,8 @@
 
 namespace af {
 
-/// Collective. af-precompute: reads, casts, trains, encodes and writes one field, or prints the
-/// dry run.
+/// Collective. Runs af-precompute: reads, casts, trains, encodes and writes one field, or prints
+/// the dry run.
 void run_precompute(const PrecomputeOptions& options,
                     const std::string& command_line,
                     const Communicator& communicator);

@@ -10,7 +10,7 @@
 
 namespace af {
 
-/// What stands around the work of a run: who does it, where it can stop, how long it takes.
+/// What surrounds the work of a run: who does it, where it can stop, how long it takes.
 struct PrecomputeRun {
   const Communicator& world;
   const std::string& command_line;

@@ -54,7 +54,7 @@ int st_nodes_at_most_apart(const std::vector<FieldPart>& parts, double spacing_m
   return (static_cast<int>(nodes) + kMultiple - 1) / kMultiple * kMultiple;
 }
 
-/// Alone on its node, a rank holds the CT and its grid as memory of its own.
+/// A rank that is alone on its node holds the CT and its grid as memory of its own.
 std::uint64_t without_volume(std::uint64_t own_bytes,
                              const SizedField& field,
                              const PrecomputeRun& run) {
@@ -144,7 +144,7 @@ SizedField with_nodes_of_spacing(SizedField field, const Communicator& communica
 MemoryPlan memory_plan(const SizedField& field,
                        const std::vector<WorkUnit>& units,
                        const PrecomputeRun& run) {
-  // The program's pages are shared by the ranks of a node, but the first rank counts, too.
+  // The ranks of a node share the program's pages, but the first rank counts them too.
   const ProcessMemory now = measured_memory();
   const std::uint64_t fixed =
       largest_over_ranks(without_volume(now.own_bytes, field, run) + now.program_bytes, run.world);

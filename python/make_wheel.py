@@ -48,7 +48,7 @@ def main() -> None:
         tree = Path(scratch, "tree")
         package = tree / "attenuation_fields"
         shutil.copytree(prefix / options.install_folder / "attenuation_fields", package)
-        # The name that the module asks for; the others are links to it.
+        # The module asks for this name; the others are links to it.
         major_minor = ".".join(options.version.split(".")[:2])
         library = f"libattenuation_fields.so.{major_minor}"
         shutil.copy(prefix / options.library_folder / library, package / library)

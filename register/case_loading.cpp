@@ -38,7 +38,7 @@ namespace {
 /// Half the side of the cube about the ROI centre that stands for the CT when it is not read.
 constexpr double kAssumedCtHalfSideMm = 100.0;
 
-/// Points of the target box whose mean motion tells whether a corrected pose stands still: 64 cells
+/// Points of the target box whose mean motion tells whether a corrected pose stands still. 64 cells
 /// give the mean over the box to a few percent.
 constexpr int kTargetPointsPerAxis = 4;
 
@@ -66,7 +66,7 @@ void require_known_field_cameras(const StudyCase& study_case, const CaseLoadOpti
   }
 }
 
-/// What rank 0 tells the others of a view's files.
+/// What rank 0 tells the others about a view's files.
 struct ViewImages {
   Image2d xray;
   Image2d mask;
@@ -74,7 +74,7 @@ struct ViewImages {
   auto members() { return std::tie(xray, mask); }
 };
 
-/// X-ray and mask of a view from their files; hashes, notes and warnings go to `loaded`.
+/// X-ray and mask of a view from their files. Hashes, notes and warnings go to `loaded`.
 ViewImages read_images(const StudyView& study_view,
                        const CameraGeometry& camera,
                        LoadedCase& loaded) {
@@ -102,7 +102,7 @@ void set_images(ViewImages images,
       mask_fiducials(view.mask, view.view.camera, study_view.fiducials_px, fiducial_mask_px);
 }
 
-/// Collective. The views without renderers; rank 0 reads the images and keeps hashes and notes.
+/// Collective. The views without renderers. Rank 0 reads the images, and keeps hashes and notes.
 std::vector<RegistrationView> read_views(const Study& study,
                                          const StudyCase& study_case,
                                          double fiducial_mask_mm,
@@ -128,7 +128,7 @@ std::vector<RegistrationView> read_views(const Study& study,
   return views;
 }
 
-/// The study's entry for the case, and the rig of its cameras, without the paths of files.
+/// Hash of the study's entry for the case and the rig of its cameras, without the paths of files.
 std::string case_sha256(const Study& study, const StudyCase& study_case) {
   Study one;
   one.rig = study.rig;
@@ -147,7 +147,7 @@ std::string case_sha256(const Study& study, const StudyCase& study_case) {
   return sha256_hex(std::as_bytes(std::span(text)));
 }
 
-/// InputError unless rays are cast through the attenuation that the field was made with.
+/// Throws InputError unless rays are cast through the attenuation with which the field was made.
 void require_same_attenuation(const FieldIdentity& field,
                               const CaseLoadOptions& options,
                               const std::string& path) {
@@ -165,13 +165,14 @@ void require_same_attenuation(const FieldIdentity& field,
       path);
 }
 
-/// "as HU" or what differs from that.
+/// "as HU", or what differs from that.
 std::string how(const CtReadOptions& reading) {
   const std::string text = reading.text();
   return text.empty() ? "as HU" : "with " + text;
 }
 
-/// The field must be of the case's CT, and of the attenuation that rays are cast through.
+/// Requires that the field belongs to the case's CT, and to the attenuation through which rays are
+/// cast.
 void require_field_of_case(const OpenedField& opened,
                            const StudyCase& study_case,
                            const CaseLoadOptions& options,
@@ -188,13 +189,13 @@ void require_field_of_case(const OpenedField& opened,
         identity.ct);
 }
 
-/// Collective. Rank 0's box on every rank: processors may differ in its last bits.
+/// Collective. Gives rank 0's box to every rank, because processors may differ in its last bits.
 MotionRange shared_box(const MotionRange& range, const Communicator& communicator) {
   const Shared<PoseParameters> high = on_root(communicator, [&] { return range.high; }).share();
   return {high->rotation_rad.x(), high->translation_mm.x()};
 }
 
-/// The views' camera that a field was made for; none: another one.
+/// The camera of the views for which a field was made. None when it is another one.
 const CameraGeometry* camera_of_field(const FieldIdentity& field,
                                       const std::vector<RegistrationView>& views) {
   for (const RegistrationView& view : views)
@@ -218,8 +219,8 @@ const CameraGeometry* camera_of_field(const FieldIdentity& field,
                       " rays; the study's has " + reach.distance);
 }
 
-/// Collective. Sets the poses that a field covers for the view's camera and returns a note about
-/// them. The field's motion range holds for its own camera only; for another camera, or an atlas,
+/// Collective. Sets the poses that a field covers for the view's camera, and returns a note about
+/// them. The field's motion range holds only for its own camera. For another camera, or an atlas,
 /// its rays decide.
 std::string limit_to_rays(const OpenedField& opened,
                           const RegistrationProblem& problem,
@@ -243,7 +244,7 @@ std::string limit_to_rays(const OpenedField& opened,
   return reach.distance + "; " + reach.text(camera.name);
 }
 
-/// Collective. The field of a view, open already or opened, and checked against the case.
+/// Collective. The field of a view, opened if need be, and checked against the case.
 std::shared_ptr<const OpenedField> field_of_view(const std::string& path,
                                                  const std::string& camera,
                                                  const StudyCase& study_case,
@@ -261,8 +262,8 @@ std::shared_ptr<const OpenedField> field_of_view(const std::string& path,
   return field;
 }
 
-/// Collective. The fields of all views; hashes and notes go to `loaded`. Returns what they made of
-/// HU.
+/// Collective. The fields of all views. Hashes and notes go to `loaded`. Returns the attenuation
+/// model that they share.
 AttenuationModel use_fields(const StudyCase& study_case,
                             const CaseLoadOptions& options,
                             const Communicator& communicator,
@@ -309,7 +310,7 @@ AttenuationModel use_fields(const StudyCase& study_case,
   return model;
 }
 
-/// Blur of a level, mean over the views, mm.
+/// Blur of a level in mm, averaged over the views.
 double mean_blur_mm(const RegistrationProblem& problem, int level) {
   double sum = 0.0;
   for (const RegistrationView& view : problem.views)
@@ -317,7 +318,7 @@ double mean_blur_mm(const RegistrationProblem& problem, int level) {
   return sum / static_cast<double>(problem.views.size());
 }
 
-/// Collective. Ray casting beside the fields, at the levels that a correction needs.
+/// Collective. Adds ray casting beside the fields, at the levels that a correction needs.
 void add_ray_casts(const CastVolumes& volumes,
                    const std::shared_ptr<const DrrRenderer>& renderer,
                    const CaseLoadOptions& options,
@@ -345,13 +346,13 @@ NodeCt read_node_ct(const StudyCase& study_case,
   });
 }
 
-/// Whether ends are judged, and the target by itself, too. DRRs of another beam are no sums of its
-/// DRRs and those of the rest.
+/// Whether ends are judged, and the target separately too. DRRs of another beam are no sums of the
+/// target's DRRs and those of the rest.
 bool asks_target(const CaseLoadOptions& options) {
   return options.judging_level > 0 && options.beam.is_ordinary();
 }
 
-/// Collective. What fields are checked against, and the target box where ends are judged.
+/// Collective. Reads what fields are checked against, and the target box where ends are judged.
 KnownCt read_known(const StudyCase& study_case,
                    const CaseLoadOptions& options,
                    const Communicator& communicator,
@@ -368,19 +369,19 @@ KnownCt read_known(const StudyCase& study_case,
       study_case.places, "ct", [&] { return std::move(known).share().take(); });
 }
 
-/// The bone in a volume, which is what moves; all of it where that is hardly any of what
+/// The bone in a volume, which is what moves. All of the volume if bone is hardly any of what
 /// attenuates.
 std::shared_ptr<const AttenuationVolume> bone_or_all(const AttenuationVolume& volume) {
   constexpr double kLeastBone = 0.05;
-  const auto sum = [](const AttenuationVolume& of) {
-    return std::accumulate(of.voxels().begin(), of.voxels().end(), 0.0);
+  const auto sum = [](const AttenuationVolume& part) {
+    return std::accumulate(part.voxels().begin(), part.voxels().end(), 0.0);
   };
   auto bone = bone_volume(volume);
   return sum(*bone) >= kLeastBone * sum(volume) ? bone
                                                 : std::make_shared<AttenuationVolume>(volume);
 }
 
-/// RegistrationView::target_casts of all views, from the CT within the target box.
+/// Sets RegistrationView::target_casts of all views, from the CT within the target box.
 void add_target_casts(VolumePart box, const AttenuationModel& model, RegistrationProblem& problem) {
   if (std::all_of(
           box.voxels.begin(), box.voxels.end(), [](std::uint16_t voxel) { return voxel == 0; }))
@@ -401,8 +402,8 @@ void add_target_casts(VolumePart box, const AttenuationModel& model, Registratio
   }
 }
 
-/// Lets the views' regions follow the target box. One that lies partly behind a source leaves the
-/// region of that view in its place.
+/// Makes the views' regions follow the target box. If the box lies partly behind a source, that
+/// view's region stays in its place.
 void follow_target(const StudyCase& study_case,
                    RegistrationProblem& problem,
                    std::vector<std::string>& warnings) {

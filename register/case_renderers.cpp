@@ -23,11 +23,11 @@
 namespace af::registration {
 namespace {
 
-/// Spacing of nodes of the field whose levels ray casting imitates when there is none: about that
-/// of the paper's field of a head or a spine.
+/// Node spacing of the field whose levels ray casting imitates when there is none: about that of
+/// the paper's field of a head or a spine.
 constexpr double kAssumedNodeMm = 1.0;
 
-/// Collective. The same CT, its attenuation, which is blurred by already_mm, blurred by sigma_mm;
+/// Collective. The attenuation of a CT that is blurred by already_mm, blurred by sigma_mm. It is
 /// held once per node.
 std::shared_ptr<const AttenuationVolume> blurred_per_node(const AttenuationVolume& volume,
                                                           double sigma_mm,
@@ -42,14 +42,14 @@ std::shared_ptr<const AttenuationVolume> blurred_per_node(const AttenuationVolum
       communicator);
 }
 
-/// Collective where it provides memory: such that the ranks of a node share.
+/// Collective where it provides memory, because the ranks of a node share it.
 FieldLevelMemory node_memory(const Communicator& communicator) {
   return [communicator](std::size_t bytes) {
     return SampleMemory{communicator.allocate_on_node(bytes), communicator.node().size() > 1};
   };
 }
 
-/// How many levels to make of a field: those of the stages, and for judging as many as its nodes
+/// How many levels of a field to make: those of the stages and, for judging, as many as its nodes
 /// allow.
 int level_count(const LightSlab& light_slab, const CaseLoadOptions& options) {
   int nodes = std::numeric_limits<int>::max();
@@ -61,9 +61,10 @@ int level_count(const LightSlab& light_slab, const CaseLoadOptions& options) {
   return std::max(options.coarsest_level, possible);
 }
 
-/// The samples of several slabs are decoded when they take no more than this: they have few
+/// The samples of several slabs are decoded when they take no more than this. They have few
 /// viewpoints, so they are small, and many nodes, which are blended faster from samples than from
-/// codewords. Those of a field with a tile filter always are: look-up by codewords knows no filter.
+/// codewords. Fields with a tile filter are always decoded, because look-up by codewords knows no
+/// filter.
 constexpr std::size_t kMostDecodedBytes = std::size_t{512} << 20;
 
 bool pays_to_decode(const CompressedAttenuationField& field) {
@@ -71,9 +72,8 @@ bool pays_to_decode(const CompressedAttenuationField& field) {
          (field.slabs.size() > 1 && decoded_bytes(field) <= kMostDecodedBytes);
 }
 
-/// Collective where the memory is. Adds to a field's samples what they lack: level 0, where it pays
-/// to decode that, and levels 1 ... halvings of its pyramid (stepping_stones:
-/// make_field_pyramid()).
+/// Collective where the memory is. Adds what a field's samples lack: level 0, where decoding it
+/// pays, and levels 1 ... halvings of its pyramid (stepping_stones: make_field_pyramid()).
 void complete(const std::shared_ptr<const CompressedAttenuationField>& field,
               int halvings,
               int stepping_stones,
@@ -91,10 +91,10 @@ void complete(const std::shared_ptr<const CompressedAttenuationField>& field,
 }
 
 /// Collective where the memory is. A field's renderers for a view: its own, and those of so many
-/// levels of its pyramid. A method's levels are those of a field of about 256 nodes: a finer field
+/// levels of its pyramid. A method's levels are those of a field of about 256 nodes. A finer field
 /// begins with more halvings, so that a level has about the same blur. The field itself is looked
-/// up as searches do (look_up_of_searches()), levels above linearly: there blur hides what cubic
-/// look-up gains.
+/// up as searches do (look_up_of_searches()). Levels above are looked up linearly, because blur
+/// hides what cubic look-up gains there.
 FieldRenderers renderers_of(const std::shared_ptr<const CompressedAttenuationField>& field,
                             const std::string& look_up,
                             int levels,
@@ -118,8 +118,8 @@ FieldRenderers renderers_of(const std::shared_ptr<const CompressedAttenuationFie
   return made;
 }
 
-/// Members of an atlas that serve poses in the inner half of its range about the nominal pose, that
-/// pose's first: most registrations need no others.
+/// Members of an atlas that serve poses in the inner half of its range about the nominal pose, the
+/// nominal pose's member first. Most registrations need no others.
 std::vector<std::uint64_t> members_in_reach(const OpenedField& opened,
                                             const PoseFrame& nominal,
                                             const View& view) {
@@ -154,7 +154,7 @@ XrayBeam beam_of(const FieldIdentity& identity,
   });
 }
 
-/// As many levels as every field of a file has.
+/// How many levels every field of a file has.
 int level_count(const OpenedField& opened, const CaseLoadOptions& options) {
   int levels = std::numeric_limits<int>::max();
   for (const auto& planes : opened.coverage().planes)
@@ -162,14 +162,14 @@ int level_count(const OpenedField& opened, const CaseLoadOptions& options) {
   return levels;
 }
 
-/// Threads for a view's levels: the run's (options.pool), or some of their own where it has none.
+/// Threads for a view's levels: the run's (options.pool), or their own where the run has none.
 struct LevelThreads {
-  std::shared_ptr<ThreadPool> own;  ///< of the level that is looked up most; may be null
+  std::shared_ptr<ThreadPool> own;  ///< for the level that is looked up most; may be null
   std::shared_ptr<ThreadPool> coarse;
 };
 
 /// Collective. An atlas's renderers for a view. Members that poses near the nominal one need are
-/// held once per node; each rank opens others itself when a search goes farther. All members'
+/// held once per node. Each rank opens others itself when a search goes farther. All members'
 /// levels have about the same blur, so the nominal pose's member states it.
 FieldRenderers renderers_of_atlas(const OpenedField& opened,
                                   int levels,
@@ -291,15 +291,15 @@ FieldRenderers field_renderers(const OpenedField& opened,
                              options.pool ? options.pool : std::make_shared<ThreadPool>()};
   int levels = level_count(opened, options);
   if (bone) levels = std::min(levels, level_count(*bone, options));
-  const auto renderers = [&](const OpenedField& of) {
-    if (of.atlas()) return renderers_of_atlas(of, levels, nominal, view, threads, communicator);
-    return renderers_of(of.field(),
-                        of.info().look_up,
+  const auto renderers = [&](const OpenedField& file) {
+    if (file.atlas()) return renderers_of_atlas(file, levels, nominal, view, threads, communicator);
+    return renderers_of(file.field(),
+                        file.info().look_up,
                         levels,
                         threads.own,
                         threads.coarse,
                         node_memory(communicator),
-                        of.samples());
+                        file.samples());
   };
   FieldRenderers all = renderers(opened);
   FieldRenderers of_bone;

@@ -15,7 +15,7 @@
 
 namespace af::registration {
 
-/// What rays are cast through.
+/// The volumes through which rays are cast.
 struct CastVolumes {
   std::shared_ptr<const AttenuationVolume> all;
   std::shared_ptr<const AttenuationVolume> bone;  ///< none for DRRs of one energy
@@ -46,15 +46,15 @@ std::vector<RendererLevel> coarse_ray_casts(const CastVolumes& volumes,
 
 /// Renderers of a field or an atlas, and the blurs of its levels 1, 2, ...
 struct FieldRenderers {
-  std::vector<std::shared_ptr<const DrrRenderer>> levels;  ///< its own first
+  std::vector<std::shared_ptr<const DrrRenderer>> levels;  ///< its own renderer first
   std::vector<double> blur_sigma_mm;
-  std::string look_up;  ///< of the first
+  std::string look_up;  ///< of the first level
 };
 
 /// Collective. Renderers for a view and its coarser levels, looked up in a field or an atlas and
 /// held once per node. With `bone` they render the tube's spectrum, at the levels that both fields
-/// have, with the blurs of the field of all. Atlas members that poses near the nominal one need are
-/// held once per node; each rank opens others itself when a search goes farther. A field's
+/// have, with the blurs of the ordinary field. Atlas members that poses near the nominal one need
+/// are held once per node, and each rank opens others itself when a search goes farther. A field's
 /// samples stay with it (OpenedField::samples()).
 FieldRenderers field_renderers(const OpenedField& opened,
                                const std::optional<OpenedField>& bone,

@@ -12,10 +12,10 @@ namespace af::registration {
 
 /// Which camera's field is where, as typed.
 struct FieldPaths {
-  std::vector<std::string> texts;  ///< CAMERA=PATH each
+  std::vector<std::string> texts;  ///< each as CAMERA=PATH
 
   void describe(Fields& field);
-  /// Of sound ones.
+  /// Only for valid texts.
   [[nodiscard]] std::map<std::string, std::filesystem::path> by_camera() const;
 };
 

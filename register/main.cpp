@@ -38,7 +38,7 @@ std::string optimizer_list() {
 
 }  // namespace
 
-// Binding options can throw only by a defect, which may well end the program.
+// Binding options can only throw by a defect, which may well end the program.
 // NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
   af::registration::RegisterOptions options;

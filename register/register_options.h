@@ -33,28 +33,28 @@ struct RegisterOptions {
   PoseSearchOptions search;  ///< of start "search"
   std::filesystem::path start_pose;
   std::filesystem::path starts;
-  AttenuationModel attenuation;  ///< of ray casting
+  AttenuationModel attenuation;  ///< for ray casting
   RayCasterOptions ray_caster;
   XrayBeamOptions beam;
   bool skip_ct_check = false;
   cli::ResumeOptions resume;
   PictureOptions pictures;
-  bool is_found_required = false;  ///< a doubtful pose counts as not found, too
+  bool is_found_required = false;  ///< a doubtful pose also counts as not found
   std::filesystem::path output_folder;
 
   void describe(Fields& field);
-  /// With the preset resolved.
+  /// These options with the preset resolved.
   [[nodiscard]] RegisterOptions in_force() const;
 };
 
-/// All impossible values and combinations of options; empty when the options are sound.
+/// All impossible values and combinations of options. Empty when the options are sound.
 std::vector<std::string> problems(const RegisterOptions& options);
 
-/// The renderer of a case: "field" or "raycast" if that is asked for; else ray casting where no
-/// view has a field and nothing is asked for that needs one.
+/// The renderer of a case: "field" or "raycast" if that is asked for. Otherwise rays are cast where
+/// no view has a field and nothing is asked for that needs one.
 std::string renderer_of(const RegisterOptions& options, const StudyCase& study_case);
 
-/// `coarsest_level` and `last_levels`: of the method.
+/// `coarsest_level` and `last_levels`: those of the method.
 CaseLoadOptions case_load_options(const RegisterOptions& options,
                                   int coarsest_level = 0,
                                   const std::vector<int>& last_levels = {});

@@ -14,6 +14,7 @@
 #include <optional>
 
 #include "base/error.h"
+#include "base/joined.h"
 #include "base/stored_bytes.h"
 #include "files/csv_table.h"
 #include "files/foreign_file.h"
@@ -36,7 +37,7 @@
 namespace af::registration {
 namespace {
 
-/// Rank 0: the records of all starts; the best keeps its trace.
+/// Rank 0: the records of all starts. The best keeps its trace.
 std::vector<RegistrationRecord> records_of(const ResumableItems& items, std::size_t count) {
   std::vector<RegistrationRecord> records(count);
   std::optional<RegistrationRecord> best;
@@ -50,8 +51,8 @@ std::vector<RegistrationRecord> records_of(const ResumableItems& items, std::siz
   return records;
 }
 
-/// Whether the case's landmarks give the start: when they are asked for, or when the case has
-/// landmarks and no start is given.
+/// Whether the case's landmarks give the start: they are asked for, or the case has landmarks and
+/// no start is given.
 bool starts_from_landmarks(const RegisterOptions& options, const StudyCase& study_case) {
   const bool has_start = options.start_rotation_deg.has_value() ||
                          options.start_translation_mm.has_value() || !options.start_pose.empty() ||
@@ -60,7 +61,7 @@ bool starts_from_landmarks(const RegisterOptions& options, const StudyCase& stud
   return options.start == "auto" && !has_start && has_landmarks(study_case);
 }
 
-/// SHA-256 of the study and, if given, the file of starts, by name.
+/// SHA-256 of the study and, if given, of the file of starts, by name.
 InputIdentities hashes_of_files(const RegisterOptions& options) {
   InputIdentities hashes = {{"study", sha256_of_file(options.study.string())}};
   if (!options.starts.empty()) hashes["starts"] = sha256_of_file(options.starts.string());
@@ -79,12 +80,12 @@ RegistrationOptions method_of(const RegisterOptions& options, const Communicator
   });
 }
 
-/// What the study says of the case; the same on every rank.
+/// What the study says about the case, the same on every rank.
 struct CaseToRegister {
   Shared<Study> study;
-  StudyCase of;
-  std::optional<LandmarkPose> landmarks;  ///< when they are the start
-  nlohmann::json search;                  ///< when a search found the starts; rank 0
+  StudyCase study_case;
+  std::optional<LandmarkPose> landmarks;  ///< when they give the start
+  nlohmann::json search;                  ///< when a search found the starts; on rank 0
   std::vector<RigidTransform> starts;
   std::optional<GoldStandard> gold;
 };
@@ -96,22 +97,25 @@ void warn_of(const std::vector<std::string>& texts, const Communicator& world) {
 /// Collective.
 CaseToRegister read_case(const RegisterOptions& options, const Communicator& world) {
   CaseToRegister found{shared_study(options.study, world), {}, {}, {}, {}, {}};
-  found.of = all_or_none(world, [&] { return found.study->find_case(options.case_name); });
-  if (starts_from_landmarks(options, found.of))
-    found.landmarks = all_or_none(world, [&] { return landmark_pose(found.study, found.of); });
+  found.study_case = all_or_none(world, [&] { return found.study->find_case(options.case_name); });
+  if (starts_from_landmarks(options, found.study_case))
+    found.landmarks =
+        all_or_none(world, [&] { return landmark_pose(found.study, found.study_case); });
   std::vector<std::string> notes;
   found.starts = shared_poses(world, [&] {
     if (found.landmarks.has_value()) return std::vector{found.landmarks->room_from_ct};
     if (options.start == "search") return std::vector<RigidTransform>();  // find_starts()
     return start_poses(
-        options, {found.of.frame(), conversion_options(options.study, found.of.name)}, notes);
+        options,
+        {found.study_case.frame(), conversion_options(options.study, found.study_case.name)},
+        notes);
   });
   warn_of(notes, world);
-  found.gold = all_or_none(world, [&] { return known_gold(found.study, found.of); });
+  found.gold = all_or_none(world, [&] { return known_gold(found.study, found.study_case); });
   return found;
 }
 
-/// Collective. The problem of the case: X-rays and renderers.
+/// Collective. The problem of the case, with X-rays and renderers.
 LoadedCase load_problem(const RegisterOptions& options,
                         const RegistrationOptions& method,
                         const CaseToRegister& registered,
@@ -123,8 +127,8 @@ LoadedCase load_problem(const RegisterOptions& options,
   load.judging_level = PoseExaminer::coarsest_level();
   load.region_follows_target = method.region_follows_target;
   load.pool = pool;
-  const WorkNote note("loading case " + registered.of.name, WorkNote::Kind::Phase);
-  LoadedCase loaded = load_case(registered.study, registered.of, load, world);
+  const WorkNote note("loading case " + registered.study_case.name, WorkNote::Kind::Phase);
+  LoadedCase loaded = load_case(registered.study, registered.study_case, load, world);
   warn_of(loaded.warnings, world);
   for (const auto& [input, text] : loaded.input_notes)
     inform(world, std::string(input).append(": ").append(text));
@@ -188,9 +192,9 @@ RunDescription description_of(const RegisterOptions& in_force,
                               const std::string& command_line,
                               const Communicator& world) {
   RunDescription description{
-      registered.of.name, in_force.renderer, {}, {}, {}, !in_force.pictures.are_left_out};
+      registered.study_case.name, in_force.renderer, {}, {}, {}, !in_force.pictures.are_left_out};
   if (registered.landmarks.has_value())
-    description.landmarks = to_json(*registered.landmarks, registered.of);
+    description.landmarks = to_json(*registered.landmarks, registered.study_case);
   description.search = registered.search;
   description.provenance = {"af-register",
                             command_line,
@@ -219,7 +223,7 @@ void warn_of_clipped(const std::vector<RegistrationRecord>& records, const Commu
 
 void add_target_errors(const CaseToRegister& registered, std::vector<RegistrationRecord>& records) {
   if (!registered.gold.has_value()) return;
-  const std::vector<Eigen::Vector3d> points = target_points(registered.of.target_box_ct);
+  const std::vector<Eigen::Vector3d> points = target_points(registered.study_case.target_box_ct);
   const auto error_mm = [&](const RigidTransform& pose) {
     return mean_tre_mm(pose, registered.gold->room_from_ct, points);
   };
@@ -249,11 +253,11 @@ void write_results(const RegisterOptions& options,
   const std::filesystem::path slicer = options.output_folder / "slicer";
   // Before result.json: when that is there, everything is.
   if (is_found && description.has_pictures)
-    write_slicer_folder(problem, best.result.room_from_ct, registered.of, slicer);
+    write_slicer_folder(problem, best.result.room_from_ct, registered.study_case, slicer);
   else
     remove_slicer_files(problem, slicer);  // an earlier run's
   if (registered.landmarks.has_value())
-    std::cout << residuals_text(*registered.landmarks, registered.of);
+    std::cout << residuals_text(*registered.landmarks, registered.study_case);
   std::cout << write_run(records, problem, description, options.output_folder);
   folder.finish();
   if (!is_found)
@@ -290,7 +294,7 @@ void run_registration(const RegisterOptions& typed,
   RunFolder folder({typed.output_folder, result_file_names(), typed.resume.restarts}, world);
   CaseToRegister registered = read_case(typed, world);
   RegisterOptions options = typed;
-  options.renderer = renderer_of(typed, registered.of);
+  options.renderer = renderer_of(typed, registered.study_case);
   if (options.renderer == "raycast" && options.renderer != typed.renderer && world.is_root())
     std::cout << kCastsWithoutFields;
   const auto pool = std::make_shared<ThreadPool>(thread_count(options.method.threads));
@@ -310,7 +314,7 @@ void run_registration(const RegisterOptions& typed,
   folder.open();
 
   RegisterOptions in_force = options.in_force();
-  in_force.case_name = registered.of.name;
+  in_force.case_name = registered.study_case.name;
   const RunDescription description =
       description_of(in_force, registered, loaded, command_line, world);
   std::vector<RegistrationRecord> records = register_starts(

@@ -5,8 +5,8 @@
 
 namespace af {
 
-/// The linker's hash of the program or library that holds this code, which changes with any of it:
-/// hexadecimal digits. "" where it was linked without (--build-id).
+/// The linker's hash of the program or library that holds this code, in hexadecimal digits. It
+/// changes with any of it. "" where it was linked without --build-id.
 std::string build_id();
 
 }  // namespace af

@@ -36,8 +36,8 @@ class SharedBytes {
   void* start_;
 };
 
-/// How the work ended, as the copy records it; other code of a program that uses us as a library
-/// may take the copy's exit status first.
+/// How the work ended, as the copy records it. The exit status is not enough: other code of a
+/// program that uses us as a library may take it first.
 enum class Verdict : char { None = 0, Done, Refused };
 
 void set_limit(decltype(RLIMIT_CPU) resource, rlim_t most) {
@@ -47,7 +47,7 @@ void set_limit(decltype(RLIMIT_CPU) resource, rlim_t most) {
   ::setrlimit(resource, &limit);
 }
 
-/// Seconds of processor time in which the work must be done.
+/// Seconds of processor time within which the work must be done.
 std::size_t most_seconds(std::size_t bytes) {
   constexpr std::size_t kFewSeconds = 60;
   constexpr std::size_t kBytesPerSecond = 1u << 20;
@@ -59,7 +59,7 @@ void limit_resources(std::size_t bytes) {
   constexpr std::size_t kFewBytes = std::size_t{1} << 30;
   set_limit(RLIMIT_CORE, 0);
   set_limit(RLIMIT_CPU, most_seconds(bytes));
-  std::size_t pages = 0;  // that the process has already
+  std::size_t pages = 0;  // pages that the process has already
   if (std::ifstream("/proc/self/statm") >> pages)
     set_limit(RLIMIT_AS,
               pages * static_cast<std::size_t>(::sysconf(_SC_PAGESIZE)) + kFewBytes +
@@ -73,8 +73,8 @@ void be_quiet() {
   ::dup2(nothing, STDERR_FILENO);
 }
 
-/// Signals end the copy as they would end a plain program, whatever handlers this one has, and
-/// whatever this thread keeps from itself.
+/// Makes signals end the copy as they would end a plain program, whatever handlers this process has
+/// and whatever this thread blocks.
 void reset_signals() {
   sigset_t all;
   ::sigemptyset(&all);
@@ -91,7 +91,7 @@ void reset_signals() {
                            const std::function<bool(std::span<char>)>& work,
                            unsigned deadline_seconds) {
   reset_signals();
-  ::alarm(deadline_seconds);  // of the kernel: it ends the copy even when that waits for ever
+  ::alarm(deadline_seconds);  // the kernel ends the copy even when it waits for ever
   be_quiet();
   limit_resources(bytes.size());
   Verdict found = Verdict::Refused;
@@ -101,7 +101,7 @@ void reset_signals() {
     found = Verdict::Refused;
   }
   verdict = static_cast<char>(found);
-  ::_exit(0);  // nothing of this process is to be tidied up or written twice
+  ::_exit(0);  // nothing of this process may be tidied up or written twice
 }
 
 std::string end_of(int status, Verdict verdict) {
@@ -117,7 +117,7 @@ std::string end_of(int status, Verdict verdict) {
 ContainedWork contained_work(std::size_t bytes,
                              const std::function<bool(std::span<char>)>& work,
                              std::optional<unsigned> deadline_seconds) {
-  // On a busy machine, work gets a part of a processor.
+  // On a busy machine, work gets only part of a processor.
   constexpr std::size_t kSecondsPerSecond = 5;
   const unsigned deadline =
       deadline_seconds.value_or(static_cast<unsigned>(kSecondsPerSecond * most_seconds(bytes)));

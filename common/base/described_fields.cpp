@@ -27,7 +27,7 @@ std::string words_of_list(const std::vector<std::string>& names) {
   return text;
 }
 
-/// Hands one value, or those of a list or an optional one, on.
+/// Passes on one value, or those of a list or an optional one.
 struct ElementVisitor {
   const std::function<void(double)>& number;
   const std::function<void(const std::string&)>& text;
@@ -226,7 +226,7 @@ Field& Fields::add(const std::string& name, FieldValue value, const std::string&
   field.value = value;
   field.help = help;
   field.group = group_;
-  // Points and directions.
+  // Points and directions are typed with commas.
   field.is_comma_separated = std::visit(
       [](const auto* of_field) { return kIsArray<std::remove_cvref_t<decltype(*of_field)>>; },
       value);

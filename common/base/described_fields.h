@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A struct of options describes itself once. Command line (cli/bind_options.h), TOML of the options
-// in force and keys of unfinished work (files/options_toml.h) and the check of its values
+// A struct of options describes itself once. The command line (cli/bind_options.h), TOML of the
+// options in force and keys of unfinished work (files/options_toml.h) and the check of its values
 // (field_problems()) follow from that:
 //
 //     struct FieldDesign {
@@ -80,15 +80,15 @@ struct Field {
 
   std::vector<Constraint> constraints;  ///< field_problems()
   std::vector<std::string> choices;     ///< the command line refuses others
-  std::string group;                    ///< of options, in the help
+  std::string group;                    ///< heading of its option in the help
   std::string exactly_one_of;           ///< group of which exactly one option must be given
   std::vector<std::string> excluded;    ///< names of options that must not be given beside it
   std::vector<std::string> needed;      ///< names of options that must be given beside it
-  int number_count = 0;                 ///< of a list; 0: any
+  int number_count = 0;                 ///< length of a list; 0: any
   bool is_required = false;
   bool is_checked_when_typed = false;  ///< the command line refuses what breaks a constraint
   bool is_comma_separated = false;
-  bool takes_one_at_a_time = false;  ///< of a list: the option is repeated
+  bool takes_one_at_a_time = false;  ///< for a list: the option is repeated
   bool is_size = false;              ///< "8GB"
   bool is_off_switch = false;        ///< the option makes it false
   bool shows_default = true;
@@ -114,7 +114,7 @@ struct Field {
   // The command line.
   Field& as(std::string option_names);
   Field& as(std::string option_names, std::string help_text);
-  /// The field has no option; `why` is for readers of the code.
+  /// The field has no option. `why` is for readers of the code.
   Field& no_option(const char* why);
   Field& choice(std::vector<std::string> names);
   Field& one_of_group(std::string name);
@@ -130,15 +130,15 @@ struct Field {
   Field& default_in_help();
   Field& stands_for(PathRole role, std::string endings = "");
 
-  // Records; `why` is for readers of the code.
+  // Records. `why` is for readers of the code.
   /// Neither recorded nor deciding.
   Field& not_recorded(const char* why);
   /// Recorded, but unfinished work may continue with another value.
   Field& not_deciding(const char* why);
-  /// Names an input file: the checksum of its content decides results, not its name.
+  /// Names an input file. The checksum of its content decides results, not its name.
   Field& input();
   Field& decides(std::string stage_name);
-  /// When it is not given, `other_name = text` is recorded.
+  /// When the field is not given, `other_name = text` is recorded.
   Field& recorded_when_unset(std::string other_name, std::string text);
 };
 
@@ -158,11 +158,11 @@ class Fields {
     return add(name, &value, help);
   }
 
-  /// The fields of a described member or base class as if they were the struct's own.
+  /// Lists the fields of a described member or base class as if they were the struct's own.
   template <Described T>
   void part(T& described);
 
-  /// A member that is no option.
+  /// A member that is not an option.
   template <typename T>
   void leave_out(const T& /*member*/, const char* /*why*/) {
     ++own_count_;
@@ -170,7 +170,7 @@ class Fields {
 
   /// Group of the options listed from now on; "" for none.
   void start_group(std::string name) { group_ = std::move(name); }
-  /// A field that is already listed, so that a struct can change what its part says of it.
+  /// A field that is already listed, so that a struct can change what a part says of it.
   Field& at(const std::string& name);
   Field& last() { return fields_.back(); }
   /// None of the fields listed so far has an option.

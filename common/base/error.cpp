@@ -11,7 +11,7 @@ std::string file_prefix(const std::string& file) {
   return file.empty() ? std::string() : file + ": ";
 }
 
-/// Not within a character of UTF-8.
+/// The nearest position that does not cut a UTF-8 character.
 std::size_t character_start(std::string_view text, std::size_t position) {
   constexpr unsigned kMask = 0xC0;
   constexpr unsigned kContinuation = 0x80;

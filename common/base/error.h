@@ -15,13 +15,13 @@ enum class ExitCode : int {
   File = 4,
   Numeric = 5,
   Internal = 6,
-  NotFound = 7,  ///< a search is done, its files are written, and what it sought is not found,
+  NotFound = 7,  ///< a search is done and its files are written, but what it sought is not found,
                  ///< or found with a doubt that the caller does not accept
   Stopped = 75,  ///< stopped on request, progress saved: run the same command again
 };
 
-/// The message with every long line shortened to some thousand bytes: the middle, where text from a
-/// file or the command line stands, is replaced by a note of how many bytes were left out.
+/// The message with every long line shortened to some thousand bytes. The middle, which holds text
+/// from a file or the command line, is replaced by a note of how many bytes were left out.
 std::string shortened(const std::string& message);
 
 /// Base of all errors the project throws on purpose; carries the exit code that app_main returns.
@@ -44,7 +44,7 @@ class UsageError : public Error {
   explicit UsageError(const std::string& message) : Error(ExitCode::Usage, message) {}
 };
 
-/// Readable but unacceptable input: names field, value, constraint and, when there is one, file
+/// Readable but unacceptable input. Names field, value, constraint and, when there is one, file
 /// (and line).
 class InputError : public Error {
  public:
@@ -91,9 +91,9 @@ class RemoteError : public Error {
   RemoteError(ExitCode exit_code, const std::string& message) : Error(exit_code, message) {}
 };
 
-/// A broken promise of the caller (a defect, not bad input); becomes exit code 6. The location
-/// comes from builtins that GCC and Clang share: Clang 14, whose tools check this code, lacks
-/// std::source_location.
+/// Fails on a broken promise of the caller (a defect, not bad input), which becomes exit code 6.
+/// The location comes from builtins that GCC and Clang share, because Clang 14, whose tools check
+/// this code, lacks std::source_location.
 void check(bool condition,
            const char* message,
            const char* file = __builtin_FILE(),

@@ -6,7 +6,7 @@
 namespace af {
 
 bool is_plain_file_name(std::string_view name) {
-  // File systems allow 255 bytes; a file's name may hold a case's name, a camera's name and a
+  // File systems allow 255 bytes, and a file's name may hold a case's name, a camera's name and a
   // suffix.
   constexpr std::size_t kMaxBytes = 100;
   constexpr unsigned char kDelete = 0x7F;

@@ -10,7 +10,7 @@ namespace {
 
 std::atomic<std::uint32_t> forks = 0;
 
-/// Before main() or while the library is loaded, so before any fork of interest.
+/// Runs before main() or while the library is loaded, so before any fork of interest.
 [[maybe_unused]] const int is_counting = pthread_atfork(nullptr, nullptr, [] { ++forks; });
 
 constexpr int kThreadBits = 32;

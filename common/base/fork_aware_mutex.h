@@ -10,9 +10,9 @@ namespace af {
 /// Grows with every fork() between this process and the one that loaded this code.
 std::uint32_t fork_generation();
 
-/// A mutex that nobody waits for in vain. Where another thread held it at the fork(), what it
-/// guards may be half changed: in the copy of the process lock() throws InputError, every time. So
-/// it does for the thread that holds it. \test
+/// A mutex that nobody waits for in vain. If another thread held it at the fork(), what it guards
+/// may be half changed, so in the copy of the process lock() throws InputError, every time. It also
+/// throws for the thread that already holds it. \test
 /// ForkAwareMutex.IsRefusedInACopyWhereAnotherThreadHeldIt
 class ForkAwareMutex {
  public:
@@ -20,7 +20,8 @@ class ForkAwareMutex {
   void unlock();
 
  private:
-  std::atomic<std::uint64_t> holder_ = 0;  ///< generation and number of its thread; 0: nobody
+  std::atomic<std::uint64_t> holder_ =
+      0;  ///< generation and number of the thread that holds it; 0: nobody
 };
 
 }  // namespace af

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A family of things that are chosen by name (measures, optimisers, casters, ...) is one array of
 // rows, each with a `name`, a `help` and whatever makes it. Options, their help, error texts,
-// listings and tests iterate that array, so an addition is one row.
+// listings and tests iterate over that array, so an addition is one row.
 #pragma once
 
 #include <algorithm>
@@ -14,7 +14,7 @@
 
 namespace af {
 
-/// The names of rows; also of cameras, cases and the like.
+/// The names of rows, or of cameras, cases and the like.
 template <typename Rows>
 std::vector<std::string> names_of(const Rows& rows) {
   std::vector<std::string> names;
@@ -30,7 +30,7 @@ std::string help_of(const Rows& rows) {
       rows, "; ", [](const auto& row) { return std::string(row.name) + ": " + row.help; });
 }
 
-/// nullptr: there is none of that name.
+/// The row of that name; nullptr when there is none.
 template <typename Rows>
 auto find_row(const Rows& rows, const std::string& name) {
   const auto found = std::ranges::find_if(rows, [&](const auto& row) { return name == row.name; });
@@ -43,7 +43,7 @@ std::string unknown_name_text(const Rows& rows, const std::string& field, const 
   return field + " = '" + name + "': must be one of " + joined(names_of(rows));
 }
 
-/// InputError with that text when there is none of that name.
+/// The row of that name. Throws InputError with the text above when there is none.
 template <typename Rows>
 const auto& required_row(const Rows& rows, const std::string& field, const std::string& name) {
   const auto* const row = find_row(rows, name);

@@ -11,7 +11,7 @@ namespace af {
 /// number_text().
 std::optional<double> parsed_number(std::string_view text);
 
-/// As parsed_number(), of finite numbers alone.
+/// Like parsed_number(), but only for finite numbers.
 std::optional<double> finite_number(std::string_view text);
 
 }  // namespace af

@@ -15,7 +15,7 @@ inline constexpr std::uint64_t kMaxVoxels = std::uint64_t{1} << 32;  ///< 8 GB o
 inline constexpr double kMaxHu = 1e6;      ///< int16 is clamped to; nothing is beyond this
 inline constexpr double kMaxRoomMm = 1e6;  ///< of each coordinate of points and translations
 
-/// Written so that NaN is not plausible.
+/// NaN is not plausible, because it fails both comparisons.
 inline bool is_plausible_spacing_mm(double spacing_mm) {
   return spacing_mm >= kMinSpacingMm && spacing_mm <= kMaxSpacingMm;
 }

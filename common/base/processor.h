@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// All that names instructions of one kind of processor (x86-64), so that another kind needs this
-// file and the widths of vector_width.cpp and af_add_kernel() alone.
+// All that names instructions of one kind of processor (x86-64). Another kind needs only another
+// version of this file, and the widths of vector_width.cpp and af_add_kernel().
 //
-// In kernels (af_add_kernel, which sets AF_VECTOR_BITS) it holds vectors by compiler extensions: of
-// 16 lanes, which are one register of 512 bits, two of 256, or four of 128; and, in namespace
-// native, of one register. Operations are per lane and never fused, so every width gives identical
-// bits.
+// In kernels (af_add_kernel, which sets AF_VECTOR_BITS) it provides vectors by compiler extensions.
+// They have 16 lanes, which are one register of 512 bits, two of 256, or four of 128. Those in
+// namespace native have the lanes of one register. Operations are per lane and never fused, so
+// every width gives identical bits.
 #pragma once
 
 #include <immintrin.h>
@@ -24,7 +24,7 @@ AF_KERNEL_INLINE uint32_t crc32c_of_byte(uint32_t crc, uint8_t byte) {
   return _mm_crc32_u8(crc, byte);
 }
 
-/// In a loop that waits for another thread.
+/// For a loop that waits for another thread.
 AF_KERNEL_INLINE void pause() {
   _mm_pause();
 }
@@ -49,7 +49,7 @@ using IntegerRegister = __m128i;
 using FloatRegister = __m128;
 #endif
 
-/// Vectors of 16 lanes, whatever the width.
+/// Vectors of 16 lanes for any width.
 namespace lanes16 {
 
 inline constexpr int kLanes = 16;
@@ -109,8 +109,8 @@ AF_KERNEL_INLINE Ints16 gather_pairs(const uint16_t* base, Ints16 offset) {
   return pairs;
 }
 
-/// a b + sum per lane, rounded once where the width has such an instruction. For code whose bits do
-/// not count.
+/// a b + sum per lane, rounded once where the width has such an instruction. Only for code whose
+/// bits do not matter.
 AF_KERNEL_INLINE Floats16 multiply_add(Floats16 a, Floats16 b, Floats16 sum) {
 #if AF_VECTOR_BITS == 512
   __m512 parts[3];
@@ -127,8 +127,8 @@ AF_KERNEL_INLINE Floats16 multiply_add(Floats16 a, Floats16 b, Floats16 sum) {
 
 }  // namespace lanes16
 
-/// Vectors of one register, for code whose lanes are independent: GCC keeps vectors of several in
-/// memory.
+/// Vectors of one register, for code whose lanes are independent. GCC keeps vectors of several
+/// registers in memory.
 namespace native {
 
 inline constexpr int kLanes = AF_VECTOR_BITS / 32;
@@ -309,7 +309,8 @@ AF_KERNEL_INLINE Floats maximum(Floats a, Floats b) {
   return AF_INTRINSIC(max_ps)(a, b);
 }
 
-/// 16-bit lanes, saturated to 0 ... 65535; within each group of 128 bits a's four, then b's.
+/// Lanes as 16 bits, saturated to 0 ... 65535. Within each group of 128 bits, a's four come first,
+/// then b's.
 AF_KERNEL_INLINE Register pack_unsigned(Ints a, Ints b) {
   return AF_INTRINSIC(packus_epi32)(reinterpret_cast<Register>(a), reinterpret_cast<Register>(b));
 }
@@ -350,7 +351,7 @@ AF_KERNEL_INLINE Ints upper_halves(Ints pairs) {
   return reinterpret_cast<Ints>(reinterpret_cast<UnsignedInts>(pairs) >> 16);
 }
 
-/// Bits of the lanes of a comparison's result that are set.
+/// One bit per lane: whether it is set in the result of a comparison.
 AF_KERNEL_INLINE uint32_t bits_of(Ints mask) {
 #if AF_VECTOR_BITS == 512
   return _mm512_movepi32_mask(reinterpret_cast<__m512i>(mask));
@@ -439,7 +440,7 @@ AF_KERNEL_INLINE Ints pick(Ints window, Ints index) {
                                                             reinterpret_cast<__m256i>(index)));
 #endif
 }
-/// Of two windows, one after the other: index modulo 2 kLanes.
+/// The same in two windows, one after the other, at index modulo 2 kLanes.
 AF_KERNEL_INLINE Floats pick(Floats low, Floats high, Ints index) {
 #if AF_VECTOR_BITS == 512
   return _mm512_permutex2var_ps(low, reinterpret_cast<__m512i>(index), high);

@@ -5,7 +5,7 @@
 
 namespace af {
 
-/// Numerics report progress through this callable (work done, whole work); programs print it with
+/// Numerics report progress through this callable (work done, whole work). Programs print it with
 /// an ETA. It may be empty.
 using ProgressCallback = std::function<void(double done, double total)>;
 

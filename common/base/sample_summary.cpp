@@ -26,7 +26,7 @@ double quantile(std::span<const double> sorted, double p) {
   const double position = p * static_cast<double>(sorted.size() - 1);
   const auto below = static_cast<std::size_t>(position);
   const double fraction = position - static_cast<double>(below);
-  // Without this, 0 * inf would turn up where the neighbour is infinite.
+  // Otherwise 0 * inf would turn up where the neighbour is infinite.
   if (fraction == 0.0 || sorted[below] == sorted[below + 1]) return sorted[below];
   return sorted[below] + fraction * (sorted[below + 1] - sorted[below]);
 }

@@ -19,7 +19,7 @@ double quantile(std::span<const double> sorted, double p);
 struct SampleSummary {
   std::size_t count = 0;
   double mean = 0.0;
-  double standard_deviation = 0.0;  ///< with n - 1; NaN for fewer than two values
+  double standard_deviation = 0.0;  ///< divides by n - 1; NaN for fewer than two values
   double minimum = 0.0;
   double percentile_5 = 0.0;
   double lower_quartile = 0.0;
@@ -35,7 +35,7 @@ SampleSummary summarize(std::vector<double> values);
 /// NaN for an empty sample.
 double mean_of(std::span<const double> values);
 
-/// With n - 1; NaN for fewer than two values.
+/// Divides by n - 1. NaN for fewer than two values.
 double standard_deviation_of(std::span<const double> values, double mean);
 
 }  // namespace af

@@ -8,9 +8,9 @@
 
 namespace af {
 
-/// While it lives, the loops that its thread starts in a ThreadPool, and those nested in their
-/// tasks, ask it whether to end early, about ten times a second and only on its thread. When it is
-/// met they throw StoppedError. \test StopCondition.EndsALoopOnAllItsThreads
+/// A condition for ending loops early. While it lives, the loops that its thread starts in a
+/// ThreadPool, and those nested in their tasks, ask it about ten times a second, and only on its
+/// thread. When it is met they throw StoppedError. \test StopCondition.EndsALoopOnAllItsThreads
 class StopCondition {
  public:
   explicit StopCondition(std::function<bool()> is_met);
@@ -18,7 +18,8 @@ class StopCondition {
   StopCondition(const StopCondition&) = delete;
   StopCondition& operator=(const StopCondition&) = delete;
 
-  /// That of the running thread, or of the loop in which it helps; null: none.
+  /// The condition of the running thread, or of the loop in which it helps; null when there is
+  /// none.
   static StopCondition* current();
   void throw_if_met();
 
@@ -37,7 +38,7 @@ class StopCondition {
  private:
   std::function<bool()> ask_;
   std::thread::id owner_ = std::this_thread::get_id();
-  std::chrono::steady_clock::time_point next_time_;  ///< to ask
+  std::chrono::steady_clock::time_point next_time_;  ///< when to ask next
   std::atomic<bool> is_met_ = false;
   Shared shared_;
 };

@@ -8,8 +8,8 @@
 //       auto members() { return std::tie(stage, step_mm); }
 //     };
 //
-// bytes_of() and value_of() follow from that. Numbers keep every bit, NaN and infinity. Bytes are
-// those of this machine: they are for the same program (a journal names its build).
+// bytes_of() and value_of() follow from that. Numbers keep every bit, including NaN and infinity.
+// Bytes have this machine's order: they are for the same program (a journal names its build).
 #pragma once
 
 #include <array>
@@ -126,7 +126,7 @@ class ByteReader {
     if constexpr (StoredStruct<T>) {
       std::apply([this](auto&... member) { (take(member), ...); }, value.members());
     } else if constexpr (std::is_same_v<T, bool>) {
-      // Of a damaged record, a byte may be neither 0 nor 1, which no bool can hold.
+      // In a damaged record, a byte may be neither 0 nor 1, which no bool can hold.
       std::uint8_t byte = 0;
       take(byte);
       value = byte != 0;
@@ -173,14 +173,14 @@ class ByteReader {
   void take_list(List& list) {
     std::uint64_t count = 0;
     take(count);
-    // Every element takes a byte at least, so a hostile count asks for no more than the record has.
+    // Every element takes at least a byte, so a hostile count asks for no more than the record has.
     require(count <= bytes_.size());
     if constexpr (PlainList<List>) {
       list.resize(static_cast<std::size_t>(count));
       take_raw(list.data(), list.size() * sizeof(*list.data()));
     } else {
-      // One by one: an element may be far larger in memory than its minimum of one byte in the
-      // record.
+      // Elements are appended one by one, because one may be far larger in memory than its minimum
+      // of one byte in the record.
       for (std::uint64_t i = 0; i < count; ++i) take(list.emplace_back());
     }
   }
@@ -196,7 +196,7 @@ std::vector<std::byte> bytes_of(T value) {
   return writer.take();
 }
 
-/// FileError naming `source` when the bytes are too few or too many.
+/// Throws FileError naming `source` when the bytes are too few or too many.
 template <typename T>
 T value_of(std::span<const std::byte> bytes, const std::string& source) {
   T value{};

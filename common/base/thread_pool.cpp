@@ -16,7 +16,7 @@ namespace {
 
 constexpr int kMostThreads = 1024;
 
-/// How long a thread watches for work before it sleeps. Waking it takes about as long; the time
+/// How long a thread watches for work before it sleeps. Waking it takes about as long, and the time
 /// between two evaluations of a registration is shorter.
 constexpr std::chrono::microseconds kWatchTime{100};
 
@@ -47,7 +47,7 @@ int usable_processors() {
   cpu_set_t mine;
   CPU_ZERO(&mine);
   if (sched_getaffinity(0, sizeof(mine), &mine) == 0) return std::max(1, CPU_COUNT(&mine));
-  // The machine has more processors than the set holds.
+  // The machine has more processors than the set can hold.
   return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
 }
 
@@ -84,8 +84,8 @@ void ThreadPool::start_helpers(int count) {
   for (int slot = 1; slot <= count; ++slot) helpers_.emplace_back([this, slot] { help(slot); });
 }
 
-/// The helpers are threads of another process: they can neither be joined nor destroyed, and what
-/// they were in the middle of stays undone.
+/// After a fork, the helpers are threads of another process. They can neither be joined nor
+/// destroyed, and what they were doing stays undone.
 void ThreadPool::forget_helpers() {
   static_cast<void>(new std::vector<std::jthread>(std::move(helpers_)));
   helpers_.clear();
@@ -133,7 +133,7 @@ void ThreadPool::run_tasks(Loop& loop, int slot) {
       loop.call(loop.work, task, slot);
     } catch (...) {
       const std::scoped_lock lock(mutex_);
-      // Tasks start in order: all lower ones have begun and will report their errors.
+      // Tasks start in order, so all lower ones have begun and will report their errors.
       if (!loop.failure || task < loop.failed_task) {
         loop.failure = std::current_exception();
         loop.failed_task = task;
@@ -149,11 +149,11 @@ void ThreadPool::publish(Loop& loop) {
     open_.push_back(&loop);
   }
   ++news_;
-  // Costs nothing while nobody sleeps.
+  // This costs nothing while nobody sleeps.
   for (int i = 1; i < std::min(loop.count, threads()); ++i) news_.notify_one();
 }
 
-/// No helper joins any more; waits for those inside.
+/// Lets no more helpers join, and waits for those inside.
 void ThreadPool::withdraw(Loop& loop) {
   {
     const std::scoped_lock lock(mutex_);
@@ -177,7 +177,7 @@ ThreadPool::Loop* ThreadPool::join_oldest() {
 }
 
 void ThreadPool::leave(Loop& loop) {
-  // The last touch of the loop: its thread may return at once.
+  // This is the last touch of the loop, because its thread may return at once.
   if (--loop.helpers > 0) return;
   ++departures_;
   departures_.notify_all();

@@ -21,14 +21,14 @@ int thread_count(int requested);
 /// "threads = -1: must be 0 (all processors) or more", up to 1024.
 std::vector<std::string> thread_problems(int requested);
 
-/// Threads that share the tasks of loops. The calling thread is one of them; the others watch for
-/// work for a short while after their last task and then sleep. Loops may be nested: a task may
-/// call for_each(), and threads without work help with it. Loops do not allocate. One thread from
-/// outside at a time. Loops end early by a StopCondition. In a copy of the process (fork) the first
-/// loop starts the threads anew. \test ThreadPoolOf.RunsEveryTaskOnce
+/// Threads that share the tasks of loops. The calling thread is one of them. The others watch for
+/// work for a short while after their last task, and then sleep. Loops may be nested: a task may
+/// call for_each(), and threads without work help with it. Loops do not allocate. Only one thread
+/// from outside may call at a time. A StopCondition ends loops early. In a copy of the process
+/// (fork), the first loop starts the threads again. \test ThreadPoolOf.RunsEveryTaskOnce
 class ThreadPool {
  public:
-  /// `threads`: the caller's included.
+  /// `threads` includes the caller's.
   explicit ThreadPool(int threads = 1);
   ~ThreadPool();
   ThreadPool(const ThreadPool&) = delete;
@@ -36,7 +36,7 @@ class ThreadPool {
 
   [[nodiscard]] int threads() const { return static_cast<int>(helpers_.size()) + 1; }
 
-  /// Calls work(task, slot) once for every task in [0, count), in any order and at the same time.
+  /// Calls work(task, slot) once for every task in [0, count), in any order and concurrently.
   /// `slot`, below threads(), differs between threads: it is a key to scratch memory. Throws the
   /// exception of the lowest task that failed; tasks after it may not have run.
   template <typename Work>
@@ -63,7 +63,7 @@ class ThreadPool {
     void* work;
     int count;
     std::atomic<int> next_task = 0;
-    std::atomic<int> helpers = 0;  ///< that are inside; changes under mutex_
+    std::atomic<int> helpers = 0;  ///< how many are inside; changes under mutex_
     int failed_task = 0;           ///< with `failure`, under mutex_
     std::exception_ptr failure = nullptr;
   };

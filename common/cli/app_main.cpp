@@ -47,7 +47,7 @@ std::string help_as(const CLI::App& app, const std::string& format) {
   return format == "bash" ? bash_completion(help) : zsh_completion(help);
 }
 
-/// --help for other readers than people at a terminal.
+/// Adds --help for other readers than people at a terminal.
 void add_help_formats(CLI::App& app) {
   app.add_option_function<std::string>(
          "--help-as",
@@ -61,7 +61,7 @@ void add_help_formats(CLI::App& app) {
       ->trigger_on_parse();
 }
 
-/// For every command.
+/// Adds an option that every command has.
 void add_no_lock(CLI::App& app) {
   app.add_flag_callback(
       "--no-lock",
@@ -78,8 +78,8 @@ std::vector<std::string> arguments_for(const CLI::App& app, int argc, char** arg
   return arguments;
 }
 
-/// Results on standard output that were not written are a failure: a full disk must not look like a
-/// success.
+/// Results that could not be written to standard output are a failure: a full disk must not look
+/// like a success.
 int with_output_written(const CLI::App& app, int exit_code) {
   errno = 0;
   if (std::cout.flush()) return exit_code;
@@ -106,13 +106,13 @@ int refuse_usage(const CLI::App& app, const CLI::ParseError& error, const Commun
   return static_cast<int>(ExitCode::Usage);
 }
 
-/// What asked for a stop.
+/// What asked for the stop.
 std::string reason_text(const RankFailure& failure) {
   const bool is_stop = failure.exit_code == static_cast<int>(ExitCode::Stopped);
   return is_stop && !stop_reason().empty() ? " (" + stop_reason() + ")" : "";
 }
 
-/// Ends the job. A rank that has not reported first leaves it for a while to the one that has.
+/// Ends the job. A rank that is not the first to report leaves that to the first for a while.
 [[noreturn]] void end_after_report(int exit_code, bool has_reported) {
   constexpr std::chrono::seconds kPatience{5};
   if (!has_reported) std::this_thread::sleep_for(kPatience);
@@ -127,7 +127,7 @@ void refuse_if_any(const CLI::App& app, const std::string& problem) {
   end_after_report(static_cast<int>(ExitCode::Usage), is_reporting);
 }
 
-/// From the watchdog's thread.
+/// Runs in the watchdog's thread.
 void end_job(const CLI::App& app, const std::string& stall) {
   std::ostringstream text;
   text << app.get_name() << ": " << stall
@@ -139,8 +139,8 @@ void end_job(const CLI::App& app, const std::string& stall) {
   MpiEnvironment::abort(static_cast<int>(ExitCode::Stopped));
 }
 
-/// Ends this process without MPI, which would itself wait for the other ranks. By then, whatever a
-/// program has made is complete or kept.
+/// Ends this process without MPI, which would itself wait for the other ranks. Whatever a program
+/// has made by then is complete or kept.
 void end_alone(const CLI::App& app, const std::string& when) {
   std::ostringstream text;
   text << app.get_name() << ": other ranks of the job hang or are stopped while " << when
@@ -149,7 +149,7 @@ void end_alone(const CLI::App& app, const std::string& when) {
   std::_Exit(static_cast<int>(ExitCode::Stopped));
 }
 
-/// What happens first when a scope is left.
+/// Runs a function first of all when a scope is left.
 class OnLeaving {
  public:
   explicit OnLeaving(std::function<void()> action) : action_(std::move(action)) {}
@@ -168,7 +168,7 @@ int app_main(CLI::App& app,
              char** argv,
              const std::function<void(const Communicator&)>& run,
              const std::function<bool()>& needs_mpi) {
-  // A write beyond a limit of file sizes is an error to report, not a signal to die from. MPI
+  // A write beyond a limit of file sizes must be an error to report, not a signal to die from. MPI
   // itself writes files.
   std::signal(SIGXFSZ, SIG_IGN);
   std::optional<WaitAlarm> alarm;  // outlives MPI
@@ -215,8 +215,8 @@ int app_main(CLI::App& app,
   } catch (...) {
     failure = failure_of(std::current_exception());
   }
-  // An error thrown on all ranks alike is printed once; one that this rank met alone ends the job,
-  // or the others would wait for it in their next collective call.
+  // An error that all ranks throw is printed once. One that only this rank met ends the job,
+  // because the others would wait for it in their next collective call.
   if (is_known_everywhere || world.size() == 1) {
     if (world.is_root())
       std::cerr << app.get_name() << ": " << failure.message << reason_text(failure) << std::endl;

@@ -10,10 +10,10 @@
 
 namespace af::cli {
 
-/// The skeleton of every program: parses the command line (on every rank alike; help and usage
-/// errors are printed by rank 0 only), starts MPI where a launcher started the process
-/// (ranks/launcher.h), runs `run`, and turns every exception into one message and the contract's
-/// exit code. When one rank alone fails inside MPI the whole job is ended.
+/// The skeleton of every program. It parses the command line (on every rank; only rank 0 prints
+/// help and usage errors), starts MPI where a launcher started the process (ranks/launcher.h), runs
+/// `run`, and turns every exception into one message and the exit code of ExitCode. When only one
+/// rank fails inside MPI, the whole job is ended.
 ///
 ///     int main(int argc, char** argv) {
 ///       Options options;
@@ -24,14 +24,15 @@ namespace af::cli {
 ///     }
 ///
 /// `run` returns normally for exit code 0. It gets Communicator::alone() where no launcher started
-/// the process, unless `needs_mpi`, asked once the options are set, says that it writes by MPI.
+/// the process, unless `needs_mpi` says that it writes by MPI. `needs_mpi` is asked once the
+/// options are set.
 int app_main(CLI::App& app,
              int argc,
              char** argv,
              const std::function<void(const Communicator&)>& run,
              const std::function<bool()>& needs_mpi = {});
 
-/// The command line as typed, quoted for a shell; goes into every output and reproduce.sh.
+/// The command line as typed, quoted for a shell. It goes into every output and reproduce.sh.
 std::string command_line(int argc, char** argv);
 
 /// The options given to a parsed (sub)command, except `left_out`, as words for a shell: " --seed 3

@@ -18,7 +18,7 @@ void bind_lists(CLI::App& app, const std::map<std::string, std::string>& lists) 
            const std::string& text = lists.at(name);
            throw CLI::CallForVersion(text.substr(0, text.find_last_not_of('\n') + 1), 0);
          },
-         "Print what there is to choose from, one a line, columns between tabs, and exit")
+         "Print the names to choose from, one per line, with tabs between columns, and exit")
       ->check(CLI::IsMember(names))
       ->trigger_on_parse();
 }

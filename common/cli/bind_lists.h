@@ -8,7 +8,7 @@
 
 namespace af::cli {
 
-/// --list NAME prints the list of that name, for scripts, and ends the program; it works without
+/// --list NAME prints the list of that name, for scripts, and ends the program. It works without
 /// options that are otherwise required.
 void bind_lists(CLI::App& app, const std::map<std::string, std::string>& lists);
 

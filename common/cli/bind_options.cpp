@@ -26,7 +26,7 @@ bool is_given(const T& value) {
     return true;
 }
 
-/// What CLI11 keeps of ours: the fields of a program's options, by command and name of the option.
+/// What CLI11 keeps for us: the fields of a program's options, by command and name of the option.
 struct BoundFields : CLI::Formatter {
   std::map<std::string, Field> of_options;
 };
@@ -38,7 +38,7 @@ App& program_of(App& app) {
   return *program;
 }
 
-/// The program is named only when it runs; a group of options has no name.
+/// The program gets its name only when it runs, and a group of options has none.
 std::string key_of(const CLI::App& app, const CLI::Option& option) {
   std::string key = option.get_name(true, true);
   for (const CLI::App* command = &app; command->get_parent() != nullptr;
@@ -83,7 +83,7 @@ CLI::Validator check_of(const Field& field) {
           ""};
 }
 
-/// The group's options must be given exactly once.
+/// The group of which exactly one option must be given.
 CLI::App& group_of(CLI::App& app, const std::string& name) {
   for (CLI::App* group : app.get_subcommands([](CLI::App*) { return true; }))
     if (group->get_group() == name || group->get_name() == name) return *group;
@@ -100,12 +100,12 @@ void bind_field(CLI::App& app, const Field& field) {
   if (!field.choices.empty()) option->check(CLI::IsMember(field.choices));
   if (field.is_checked_when_typed) option->check(check_of(field));
   if (field.number_count > 0) option->expected(field.number_count);
-  // Without extra arguments the words that follow a complete list are not taken into it.
+  // Extra arguments are off because CLI11 would add the words after a complete list to it.
   if (field.is_comma_separated) option->delimiter(',')->allow_extra_args(false);
   if (field.takes_one_at_a_time) option->allow_extra_args(false);
   if (field.is_size) {
     option->transform(CLI::AsSizeValue(true));
-    // The transform added last comes first.
+    // CLI11 applies the transform that was added last first.
     option->transform(CLI::Validator(
         [](std::string& text) {
           text = whole_bytes(text);
@@ -126,7 +126,7 @@ void bind_fields(CLI::App& app, const Fields& fields) {
     if (!field.option.empty()) bind_field(app, field);
   for (const Field& field : fields) {
     if (field.option.empty()) continue;
-    // Of "-o,--output" any one name finds the option.
+    // Any one name of "-o,--output" finds the option.
     CLI::Option* const option =
         app.get_option(field.option.substr(field.option.find_last_of(',') + 1));
     for (const std::string& other : field.excluded) option->excludes(app.get_option(other));

@@ -13,7 +13,7 @@ namespace af::cli {
 
 namespace {
 
-/// What one value of a field is, and how many it has.
+/// What one value of a field is, and how many values it has.
 struct ValueVisitor {
   OptionHelp& help;
 
@@ -55,7 +55,7 @@ struct ValueVisitor {
   }
 };
 
-/// CLI11 says "TEXT:{a,b}": the word before what follows it.
+/// The type without its choices: CLI11 says "TEXT:{a,b}".
 std::string first_word(const std::string& type) {
   return type.substr(0, type.find_first_of(": "));
 }
@@ -132,7 +132,7 @@ void add_options(const CLI::App& app, const std::string& group, CommandHelp& hel
   for (const CLI::Option* option : app.get_options()) {
     const std::string& own = option->get_group();
     if (own.empty()) continue;  // hidden
-    // CLI11 gives a group of options a --help of its own; the program's is enough.
+    // CLI11 gives a group of options a --help of its own. The program's is enough.
     if (!group.empty() && option == app.get_help_ptr()) continue;
     help.options.push_back(option_help(app, *option, !group.empty() ? group : own));
   }

@@ -16,7 +16,7 @@ namespace af::cli {
 struct OptionHelp {
   enum class Kind { Flag, Integer, Number, Text, Path };
 
-  std::vector<std::string> names;  ///< "-o", "--output"; of a positional argument its name
+  std::vector<std::string> names;  ///< "-o", "--output"; for a positional argument its name
   bool is_positional = false;
   Kind kind = Kind::Text;
   std::string value_word;    ///< "INT", "TEXT", ... as in --help; empty: a flag
@@ -48,7 +48,7 @@ struct CommandHelp {
   std::vector<CommandHelp> commands;
 };
 
-/// The help of a program that has its name and all its options.
+/// The help of a program that already has its name and all its options.
 CommandHelp command_help(const CLI::App& app);
 
 }  // namespace af::cli

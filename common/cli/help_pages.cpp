@@ -37,7 +37,7 @@ std::string value_text(const OptionHelp& option) {
   return option.value_word + (option.is_repeated ? " ..." : "");
 }
 
-/// The text says of every choice what it is, as in "fast: ...".
+/// Whether the text says of every choice what it is, as in "fast: ...".
 bool explains_choices(const OptionHelp& option) {
   return std::all_of(option.choices.begin(), option.choices.end(), [&](const std::string& choice) {
     return option.text.find(choice + ": ") != std::string::npos;
@@ -79,7 +79,8 @@ std::string markdown_row(const OptionHelp& option) {
          code(option.default_text) + " | " + cell(sentences(option)) + " |\n";
 }
 
-/// Of rows that an earlier command's table has (`shown`), only the options' names are written.
+/// Rows that an earlier command's table has (`shown`) are not repeated: only the options' names are
+/// written.
 void add_markdown(const CommandHelp& command,
                   const std::string& heading,
                   std::set<std::string>& shown,
@@ -129,7 +130,7 @@ std::string upper(std::string text) {
   return text;
 }
 
-/// Up to the end of the first sentence, without it.
+/// The text before the end of its first sentence.
 std::string first_sentence(const std::string& text) {
   std::size_t end = std::min(text.find(". "), text.find(".\n"));
   end = std::min(end, text.size());

@@ -21,20 +21,20 @@ template <typename Number>
 bool is_whole_number(std::string_view text) {
   if (text.starts_with('+')) text.remove_prefix(1);
   const std::string_view digits = text.substr(text.starts_with('-') ? 1 : 0);
-  // CLI11 takes a leading zero for octal or hexadecimal digits.
+  // CLI11 takes a leading zero for the mark of an octal or hexadecimal number.
   if (digits.size() > 1 && digits.front() == '0') return false;
   Number value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   return error == std::errc() && end == text.data() + text.size();
 }
 
-/// "8 GB" -> "8".
+/// The number of a size: "8 GB" -> "8".
 std::string_view without_unit(std::string_view text) {
   const std::size_t unit = text.find_first_not_of("+-0123456789");
   return text.substr(0, unit);
 }
 
-/// What a value must be but is not; empty when it is sound.
+/// What a value must be but is not. Empty when it is sound.
 std::string problem_of(const std::string& type, const std::string& value) {
   const auto is_of = [&](const char* name) { return type.find(name) != std::string::npos; };
   if (value.empty()) return "must not be empty";
@@ -49,7 +49,7 @@ std::string problem_of(const std::string& type, const std::string& value) {
   return {};
 }
 
-/// Bytes of a unit such as "MB" or "kib"; 0 when it is not one.
+/// Bytes of a unit such as "MB" or "kib"; 0 for an unknown one.
 double bytes_of_unit(std::string unit) {
   std::transform(unit.begin(), unit.end(), unit.begin(), [](unsigned char letter) {
     return static_cast<char>(std::tolower(letter));
@@ -82,7 +82,7 @@ std::string whole_bytes(const std::string& size) {
       number * bytes_of_unit({std::find_if(end, last, [](char c) { return c != ' '; }), last});
   constexpr double kExact = 9007199254740992.0;  // 2^53: doubles hold every whole number below
   if (!(bytes >= 1.0 && bytes <= kExact)) return size;
-  // 1.1 MB is 1100000.0000000002 in binary: the rounding allows for the last bits.
+  // 1.1 MB is 1100000.0000000002 in binary, so rounding allows for the last bits.
   return std::to_string(static_cast<std::uint64_t>(std::floor(bytes * (1.0 + 1e-15))));
 }
 

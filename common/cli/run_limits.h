@@ -6,13 +6,13 @@
 
 namespace af::cli {
 
-/// Adds --max-hours and --stall-minutes to a program, or a sub-command, that can go on after a
+/// Adds --max-hours and --stall-minutes to a program, or a sub-command, that can continue after a
 /// stop.
 void bind_run_limits(CLI::App& app);
 
 /// Options of a program, or a sub-command, that keeps unfinished work in OUTPUT.progress.
 struct ResumeOptions {
-  bool restarts = false;  ///< throw unfinished work away
+  bool restarts = false;  ///< discards unfinished work
 
   void describe(Fields& field);
 };

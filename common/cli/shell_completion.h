@@ -7,8 +7,8 @@
 
 namespace af::cli {
 
-/// A script that bash reads: completes sub-commands, options and the names that options choose
-/// from; files elsewhere. It needs no other script.
+/// A script for bash. It completes sub-commands, options and the names that options choose from,
+/// and files elsewhere. It needs no other script.
 std::string bash_completion(const CommandHelp& program);
 
 /// The same as a function of zsh's completion system.

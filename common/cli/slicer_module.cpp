@@ -32,12 +32,12 @@ std::string element(const std::string& name, const std::string& text) {
   return "<" + name + ">" + xml_text(text) + "</" + name + ">";
 }
 
-/// Slicer's widgets for numbers read plain decimals, and give them back with as many digits.
+/// Slicer's widgets for numbers read plain decimals only, and give them back with as many digits.
 bool is_plain_decimal(const std::string& text) {
   return !text.empty() && text.find_first_not_of("+-0123456789.") == std::string::npos;
 }
 
-/// How Slicer calls a kind of option.
+/// What Slicer calls a kind of option.
 struct Parameter {
   std::string tag;
   std::string attributes;
@@ -68,8 +68,8 @@ Parameter path_parameter(const OptionHelp& option) {
   return {"file", endings, "input"};
 }
 
-/// Slicer leaves texts and vectors out that are empty, and always gives numbers and choices. So an
-/// option that means something by being given must be a text.
+/// Slicer leaves out empty texts and vectors, but always gives numbers and choices. An option whose
+/// presence has a meaning must therefore be a text.
 Parameter parameter_of(const OptionHelp& option) {
   using Kind = OptionHelp::Kind;
   if (option.kind == Kind::Flag) return {"boolean", "", ""};
@@ -141,7 +141,8 @@ void add_parameter(const OptionHelp& option, std::string& xml) {
   xml += "    </" + parameter.tag + ">\n";
 }
 
-/// "Files" for what the module reads and writes, then what has no heading, then the headings.
+/// The panel of an option: first "Files" for what the module reads and writes, then what has no
+/// heading, then the headings.
 std::string panel_of(const OptionHelp& option) {
   if (option.is_required || option.path_role != PathRole::Unsaid) return "Files";
   return option.group;

@@ -21,7 +21,7 @@ struct SubCommand {
 /// Adds a sub-command without options.
 CLI::App* add_sub_command(CLI::App& program, const char* name, const char* help);
 
-/// Adds a sub-command that runs `run` with the options as typed; `options` are its defaults.
+/// Adds a sub-command that runs `run` with the options as typed. `options` holds the defaults.
 template <Described Options>
 SubCommand sub_command(CLI::App& program,
                        const char* name,

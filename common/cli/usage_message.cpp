@@ -23,7 +23,7 @@ const CLI::App& active_command(const CLI::App& app) {
   return found == named.end() ? app : active_command(**found);
 }
 
-/// An option that begins as `typed` does is meant rather than one that is spelt alike.
+/// An option that begins as `typed` does is more likely meant than one that is spelt alike.
 std::string meant_name(const std::string& typed, const std::set<std::string>& known) {
   const auto longer = known.lower_bound(typed);
   if (longer != known.end() && longer->starts_with(typed)) return *longer;
@@ -52,7 +52,7 @@ std::string unknown_command(const CommandHelp& command, const std::string& argum
          (meant.empty() ? ": choose one of " + list : ": did you mean '" + meant + "'?");
 }
 
-/// Of an option whose value cannot be converted, or which has too many or too few: what it takes.
+/// What the option takes whose value cannot be converted, or which has too many or too few values.
 std::string form_of_named_option(const CommandHelp& command, const std::string& message) {
   for (const OptionHelp& option : command.options) {
     const std::string& name = option.long_name();
@@ -71,7 +71,7 @@ std::string usage_message(const CLI::App& app, const CLI::ParseError& error) {
   const CLI::App& active = active_command(app);
   const CommandHelp command = command_help(active);
   const std::vector<std::string> unknown = app.remaining(true);
-  // Without its sub-command no option of it is known.
+  // Without its sub-command, its options are unknown too.
   if (!command.commands.empty() && !unknown.empty() && !unknown.front().starts_with('-'))
     return shortened(unknown_command(command, unknown.front()));
   const auto option = std::ranges::find_if(

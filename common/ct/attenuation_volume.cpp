@@ -20,8 +20,8 @@ std::size_t voxel_offset(const std::array<int, 3>& size, int i, int j, int k) {
          static_cast<std::size_t>(i);
 }
 
-/// The indices of voxels whose centres lie within a box of the ct frame, along each axis of the
-/// grid, of those between two; none where there are none.
+/// The indices of voxels whose centres lie within a box of the ct frame, among those between two
+/// indices along each axis of the grid. None where there are none.
 std::optional<AttenuatingBox> indices_within(const CtGrid& grid,
                                              const AttenuatingBox& all,
                                              const CtBox& box_ct) {

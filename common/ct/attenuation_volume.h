@@ -13,13 +13,12 @@
 
 namespace af {
 
-/// HU to linear attenuation: mu = mu_water * max(0, 1 + HU/1000), and HU < air_below_hu counts as
-/// 0.
+/// HU to linear attenuation: mu = mu_water * max(0, 1 + HU/1000). HU < air_below_hu counts as 0.
 struct AttenuationModel {
   double mu_water_per_mm = 0.0200;
   int air_below_hu = -900;
 
-  /// mu in units of mu_water / 1000: an exact integer: 0, or 1000 + air_below_hu to 33767.
+  /// mu in units of mu_water / 1000, an exact integer: 0, or 1000 + air_below_hu to 33767.
   [[nodiscard]] std::uint16_t relative_attenuation(std::int16_t hu) const {
     return hu < air_below_hu || hu < -1000 ? std::uint16_t{0}
                                            : static_cast<std::uint16_t>(1000 + hu);
@@ -31,24 +30,25 @@ struct AttenuationModel {
 
 std::vector<std::string> problems(const AttenuationModel& model);
 
-/// InputError when a grid has 2^31 voxels or more: casters could not address them.
+/// Throws InputError when a grid has 2^31 voxels or more, which casters could not address.
 void require_castable(const CtGrid& bordered_grid);
 
-/// The attenuating part of a CT, ready for casting: integers in units of mu_water/1000, so the HU
-/// model is exact; cropped to the box of voxels that attenuate and surrounded by a border of one
-/// zero voxel, so that trilinear interpolation falls to zero over one voxel and never needs a
-/// bounds check. Memory: 2 bytes per voxel. A volume with no attenuating voxel throws InputError.
+/// The attenuating part of a CT, ready for casting. Voxels are integers in units of mu_water/1000,
+/// so the HU model is exact. The volume is cropped to the box of voxels that attenuate, and
+/// surrounded by a border of one zero voxel. Trilinear interpolation thereby falls to zero over one
+/// voxel, and never needs a bounds check. Memory: 2 bytes per voxel. Throws InputError for a volume
+/// with no attenuating voxel.
 class AttenuationVolume {
  public:
   AttenuationVolume(const CtVolume& ct, const AttenuationModel& model);
-  /// Voxels that already exist (memory shared by the ranks of a node), laid out as voxels() of an
-  /// equal volume.
+  /// Takes voxels that already exist (in memory shared by the ranks of a node), laid out as
+  /// voxels() of an equal volume.
   AttenuationVolume(const CtGrid& bordered_grid,
                     const AttenuationModel& model,
                     SharedArray<std::uint16_t> voxels);
 
-  /// The voxels of the volume that is made from a CT, into memory for bordered_grid.voxel_count()
-  /// of them.
+  /// Writes the voxels of the volume that is made from a CT, into memory for
+  /// bordered_grid.voxel_count() of them.
   static void fill_voxels(const CtVolume& ct,
                           const AttenuationModel& model,
                           const CtGrid& bordered_grid,
@@ -63,7 +63,7 @@ class AttenuationVolume {
   /// Corners (ct frame, mm) outside which interpolated attenuation is exactly 0: the centres of the
   /// border's corner voxels.
   [[nodiscard]] std::array<Eigen::Vector3d, 8> corner_points() const;
-  /// An upper bound of any line integral: largest mu times the diagonal.
+  /// An upper bound of any line integral: the largest mu times the diagonal.
   [[nodiscard]] double max_total_attenuation() const;
 
  private:
@@ -83,8 +83,8 @@ struct VolumePart {
   }
 };
 
-/// The voxels between the first and the last index, along each axis of the grid, that a box of the
-/// ct frame reaches; the same of a CT and of its attenuation. \test
+/// The voxels that a box of the ct frame reaches, between the first and the last index along each
+/// axis of the grid. They are the same for a CT and for its attenuation. \test
 /// AttenuationVolume.APartHoldsTheVoxelsOfItsBox
 VolumePart part_within(const AttenuationVolume& volume, const CtBox& box_ct);
 VolumePart part_within(const CtVolume& ct, const AttenuationModel& model, const CtBox& box_ct);
@@ -95,10 +95,11 @@ struct AttenuatingBox {
   std::array<int, 3> high;
 };
 
-/// The smallest such box; one pass over the CT. InputError when no voxel attenuates.
+/// The smallest such box, found in one pass over the CT. Throws InputError when no voxel
+/// attenuates.
 AttenuatingBox attenuating_box(const CtVolume& ct, const AttenuationModel& model);
 
-/// Grid with border of the AttenuationVolume of a CT with that box.
+/// The bordered grid of the AttenuationVolume of a CT with that box.
 CtGrid bordered_grid(const CtGrid& ct_grid, const AttenuatingBox& box);
 
 }  // namespace af

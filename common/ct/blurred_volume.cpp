@@ -40,8 +40,8 @@ std::vector<float> weights_of_variance(double variance) {
   return normalised;
 }
 
-/// The taps of an axis whose values lie `stride` apart, for a coarse voxel whose first weight
-/// stands at fine index `first` of `count`: those within the volume.
+/// The taps along an axis whose values lie `stride` apart, for a coarse voxel whose first weight
+/// stands at fine index `first` of `count`. Only those within the volume.
 class AxisTaps {
  public:
   AxisTaps(std::span<const float> weights, int first, int count, std::int64_t stride) {
@@ -60,8 +60,8 @@ class AxisTaps {
   const float* weights_;
 };
 
-/// Blurs rows and keeps every factor-th value: values that lie `factor` apart are laid side by side
-/// first, so that sums over neighbours are sums over vectors.
+/// Blurs rows and keeps every factor-th value. Values that lie `factor` apart are first laid side
+/// by side, so that sums over neighbours are sums over vectors.
 class RowBlur {
  public:
   /// `first`: fine index of the first weight of the first coarse value.
@@ -78,7 +78,7 @@ class RowBlur {
   }
 
   void operator()(const float* row, float* blurred) {
-    // Fine value i stands begin_ + i places after the first weight; what lies outside stays 0.
+    // Fine value i stands begin_ + i places after the first weight. What lies outside stays 0.
     for (int i = 0; i < std::min(factor_, fine_); ++i) {
       const int place = begin_ + i;
       float* phase = phases_.data() + place % factor_ * phase_length_ + place / factor_;
@@ -113,7 +113,7 @@ VolumeBlur::Axis VolumeBlur::make_axis(double spacing_mm, double sigma_mm, doubl
   axis.factor = std::max(1, static_cast<int>(0.5 * sigma_mm / spacing_mm));
   while (interpolation(axis.factor) > added) --axis.factor;
   axis.weights = weights_of_variance(added - interpolation(axis.factor));
-  // The outermost voxels of the fine volume are 0; so is the first voxel of the coarse one.
+  // The outermost voxels of the fine volume are 0, and so is the first voxel of the coarse one.
   axis.first = -axis.radius();
   return axis;
 }

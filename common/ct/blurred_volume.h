@@ -11,24 +11,25 @@
 
 namespace af {
 
-/// Blurs and thins out a CT's attenuation, so that DRRs of it are those of the CT blurred by a
-/// given variance along each axis: ray casting's levels of an image pyramid.
+/// Blurs and thins out a CT's attenuation, so that its DRRs are those of the CT blurred by a given
+/// variance along each axis. Ray casting uses it for the levels of an image pyramid.
 ///
-/// Along each axis every f-th voxel remains, f being the largest whose spacing is at most half of
-/// sigma, so that interpolation leaves no trace of where the voxels lie. The weights are (a, 1 -
+/// Along each axis every f-th voxel remains, where f is the largest whose spacing is at most half
+/// of sigma, so that interpolation leaves no trace of where the voxels lie. The weights are (a, 1 -
 /// 2a, a), 0 < a <= 1/4, applied n times: their variance 2 a n is exact. Trilinear interpolation of
-/// voxels h apart itself blurs by h^2 / 6; the weights blur less by what this adds beyond that of
+/// voxels h apart itself blurs by h^2 / 6. The weights blur less by what this adds beyond that of
 /// the CT. Weights below a millionth are left out. \test VolumeBlur.SpreadsAVoxelByTheVariance
 class VolumeBlur {
  public:
-  /// `fine`: grid with border of an AttenuationVolume, which may be a CT that is blurred already,
-  /// by `already_mm` < sigma_mm, so that a pyramid of volumes costs little more than its first one.
-  /// InputError when the blurred volume would have 2^31 voxels or more.
+  /// `fine`: the bordered grid of an AttenuationVolume. That may be a CT already blurred by
+  /// `already_mm` < sigma_mm, so that a pyramid of volumes costs little more than its first one.
+  /// Throws InputError when the blurred volume would have 2^31 voxels or more.
   VolumeBlur(const CtGrid& fine, double sigma_mm, double already_mm = 0.0);
 
-  /// Grid with border of the blurred volume.
+  /// The bordered grid of the blurred volume.
   [[nodiscard]] const CtGrid& grid() const { return grid_; }
-  /// Voxels on grid(), in the volume's units and rounded to them. `from` lies on the fine grid.
+  /// Writes voxels on grid(), in the volume's units and rounded to them. `from` lies on the fine
+  /// grid.
   void fill(const AttenuationVolume& from, std::span<std::uint16_t> voxels) const;
 
  private:
@@ -48,7 +49,7 @@ class VolumeBlur {
   CtGrid grid_;
 };
 
-/// The blurred volume, in memory of this process; arguments as of VolumeBlur.
+/// The blurred volume, in memory of this process. Arguments are those of VolumeBlur.
 std::shared_ptr<const AttenuationVolume> blurred_volume(const AttenuationVolume& volume,
                                                         double sigma_mm,
                                                         double already_mm = 0.0);

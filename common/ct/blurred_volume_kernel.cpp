@@ -10,7 +10,7 @@ namespace {
 using native::Floats;
 using native::kLanes;
 
-/// Sums of kVectors vectors, so that additions need not wait for each other.
+/// Vectors that are summed at once, so that additions need not wait for each other.
 constexpr int kVectors = 4;
 
 template <typename Value>

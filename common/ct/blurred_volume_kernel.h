@@ -5,16 +5,15 @@
 
 namespace af {
 
-/// Taps of a sum: so many, each with its weight and the place of its first value.
+/// Taps of a sum, each with its weight and the place of its first value.
 struct WeightedTaps {
   const int64_t* offsets;
   const float* weights;
   int32_t count;
 };
 
-/// sums[i] = the sum of weights[k] in[offsets[k] + i] over the taps, in their order, i = 0 ...
-/// count
-/// - 1. No value beyond these is read or written.
+/// sums[i] = the sum of weights[k] in[offsets[k] + i] over the taps, in their order, for i = 0 ...
+/// count - 1. No value beyond these is read or written.
 using SumWeightedVoxels = void (*)(const uint16_t* in,
                                    const WeightedTaps& taps,
                                    int64_t count,

@@ -57,8 +57,8 @@ AxialOrder axial_order(const CtGrid& grid) {
   return order;
 }
 
-/// Of each pixel of a slice the distance (mm) to the nearest one that `is_goal` names, by steps to
-/// the eight neighbours: at most 8 % too long.
+/// The distance (mm) of each pixel of a slice to the nearest one that `is_goal` names, by steps to
+/// the eight neighbours. At most 8 % too long.
 class SliceDistance {
  public:
   explicit SliceDistance(const AxialOrder& order) : order_(order) {
@@ -106,7 +106,7 @@ class SliceDistance {
   std::vector<float> distance_;
 };
 
-/// Tissue that is farther than kEdgeMm from all that is not.
+/// Marks tissue that is farther than kEdgeMm from everything else.
 void mark_core(const AxialOrder& order,
                std::span<const std::int16_t> hu,
                std::vector<Mark>& marks) {
@@ -123,8 +123,8 @@ void mark_core(const AxialOrder& order,
   }
 }
 
-/// Gives all voxels that are connected with `seed` (6 neighbours, same mark) another mark; how
-/// many.
+/// Gives another mark to all voxels connected with `seed` (6 neighbours, same mark). Returns how
+/// many there are.
 std::size_t mark_part(const CtGrid& grid, std::size_t seed, Mark mark, std::vector<Mark>& marks) {
   const Mark wanted = marks[seed];
   const auto nx = static_cast<std::size_t>(grid.size[0]);
@@ -151,7 +151,7 @@ std::size_t mark_part(const CtGrid& grid, std::size_t seed, Mark mark, std::vect
   return count;
 }
 
-/// Marks the largest parts of the core as the body; how many there are.
+/// Marks the largest parts of the core as the body. Returns how many there are.
 std::size_t mark_body(const CtGrid& grid, std::vector<Mark>& marks) {
   struct Part {
     std::size_t seed;
@@ -173,13 +173,13 @@ std::size_t mark_body(const CtGrid& grid, std::vector<Mark>& marks) {
   return kept;
 }
 
-/// Within a slice: the edges given back, and what the body encloses.
+/// Within a slice, gives the edges back and fills what the body encloses.
 class SliceBody {
  public:
   explicit SliceBody(const AxialOrder& order)
       : order_(order), distance_(order), is_outside_(order.width * order.height) {}
 
-  /// 1 for every pixel of slice `slice` that is outside the body.
+  /// 1 for every pixel of slice `slice` outside the body.
   const std::vector<std::uint8_t>& outside(std::size_t slice, const std::vector<Mark>& marks) {
     const auto at = [&](std::size_t x, std::size_t y) {
       return slice * order_.slice_stride + y * order_.y_stride + x * order_.x_stride;
@@ -188,8 +188,8 @@ class SliceBody {
         distance_.from([&](std::size_t x, std::size_t y) { return marks[at(x, y)] == Mark::Body; });
     std::fill(is_outside_.begin(), is_outside_.end(), std::uint8_t{0});
     const auto is_body = [&](std::size_t pixel) {
-      // A step more than what was taken off: distances are between pixel centres, and the voxels
-      // along the skin are partly tissue.
+      // This is one step more than was taken off: distances are between pixel centres, and the
+      // voxels along the skin are partly tissue.
       const double reach = kEdgeMm + std::max(order_.dx_mm, order_.dy_mm);
       return static_cast<double>(away[pixel]) <= reach;
     };

@@ -31,9 +31,9 @@ struct KeptFacts {
   auto members() { return std::tie(facts, warnings); }
 };
 
-/// The names of the files that read_ct() looks at, each with the hash of its bytes, and noted as an
-/// input, or without a hash where it is skipped. None when the path is not of a CT, which read_ct()
-/// says.
+/// The names of the files that read_ct() looks at, each with the hash of its bytes and noted as an
+/// input, or without a hash where it is skipped. None when the path is not a CT, which is left to
+/// read_ct() to say.
 std::optional<std::vector<std::string>> names_and_hashes(const fs::path& path) {
   std::vector<std::string> found;
   const auto add = [&](const fs::path& file, bool is_read) {
@@ -56,9 +56,9 @@ std::optional<std::vector<std::string>> names_and_hashes(const fs::path& path) {
   return found;
 }
 
-/// Under which the facts are kept: what they follow from, hashed; the program's build id stands for
-/// all that decides what becomes of a file. None where nothing is to be kept: also of one series
-/// among others, whose files would have to be hashed, too.
+/// The key under which the facts are kept: a hash of what they follow from. The program's build id
+/// stands for all that decides what becomes of a file. There is no key where nothing is to be kept,
+/// which includes one series among others, because all files would have to be hashed.
 std::optional<std::string> key_of(const fs::path& path,
                                   const CtReadOptions& options,
                                   const AttenuationModel& model) {
@@ -108,7 +108,7 @@ KnownCt read_known_ct(const fs::path& path,
     const CtVolume ct = read_ct(path, options, &kept->warnings);
     kept->facts = facts_of(ct, model, attenuating_box(ct, model));
     part = box_ct ? part_within(ct, model, *box_ct) : VolumePart();
-    // Meanwhile the files may have been written anew.
+    // The files may have been replaced meanwhile.
     if (key && key_of(path, options, model) == key) {
       keep_in_cache(*key, *kept);
       if (box_ct) keep_in_cache(part_key, *part);

@@ -47,7 +47,7 @@ KnownCt read_known_ct(const std::filesystem::path& path,
 
 /// facts_of() what read_ct() reads, with its errors and warnings. Voxels are decoded only if the
 /// user's cache (files/user_cache.h) does not know files of these bytes under this path, read in
-/// this way: otherwise the files are only hashed.
+/// this way. Otherwise the files are only hashed.
 CtFacts read_ct_facts(const std::filesystem::path& path,
                       const CtReadOptions& options,
                       const AttenuationModel& model,

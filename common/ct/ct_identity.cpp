@@ -17,7 +17,7 @@ std::string size_text(const CtGrid& grid) {
 
 std::string place_text(const Eigen::Vector3d& point_mm) {
   std::ostringstream text;
-  // To a micrometre, as places are compared.
+  // A micrometre is enough, because places are compared to that.
   text << std::setprecision(7) << "(" << point_mm.x() << ", " << point_mm.y() << ", "
        << point_mm.z() << ") mm";
   return text.str();

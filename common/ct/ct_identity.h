@@ -8,7 +8,7 @@
 
 namespace af {
 
-/// Which CT it is: its voxels, and where they lie. The order of axes in its file says nothing.
+/// Which CT it is: its voxels, and where they lie. The order of axes in its file does not matter.
 struct CtIdentity {
   std::string content_sha256;  ///< of size and int16 HU voxels, axes in ascending LPS
   CtGrid grid;                 ///< its axes in ascending LPS
@@ -25,7 +25,7 @@ std::string text(const CtIdentity& ct);
 /// off. Empty when they are the same CT.
 std::string ct_difference(const CtIdentity& expected, const CtIdentity& found);
 
-/// FileError unless the file at `path` is of `expected`, which `expected_is` names.
+/// Throws FileError unless the file at `path` holds `expected`, which messages call `expected_is`.
 void require_same_ct(const std::string& path,
                      const CtIdentity& expected,
                      const std::string& expected_is,

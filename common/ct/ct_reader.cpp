@@ -32,12 +32,11 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr int kAirBelowHu = -900;
-/// Share of bone that --body-only may remove: more means that the body itself was taken for a
-/// table.
+/// Share of bone that --body-only may remove. More means that it took the body itself for a table.
 constexpr double kMostDenseRemoved = 0.1;
-/// Of axes from orthonormal: numbers in single precision.
+/// Deviation of axes from orthonormal that numbers in single precision explain.
 constexpr double kDirectionRounding = 1e-6;
-/// Weight of what settles ties of axis orders (directions at 45 degrees).
+/// Weight of the term that settles ties between axis orders (directions at 45 degrees).
 constexpr double kTieWeight = 1e-2;
 
 std::string triple(const auto& values) {
@@ -50,7 +49,7 @@ std::string triple(const auto& values) {
   return "(" + text(values[0]) + ", " + text(values[1]) + ", " + text(values[2]) + ")";
 }
 
-/// Refuses what is no scalar volume; runs before voxels are allocated.
+/// Refuses anything but a scalar volume. Runs before voxels are allocated.
 void check_is_scalar_volume(const RawImage& image, const fs::path& path) {
   if (image.channels != 1)
     throw InputError("channels",
@@ -160,7 +159,7 @@ void check_values(const CtGrid& grid,
                      "HU must be within 1e6 (" + std::to_string(values.implausible_count()) +
                          " voxels are beyond)",
                      file);
-  // By value, which is vectorised.
+  // A copy instead of a reference lets the compiler vectorise the loop.
   std::int16_t low = values.hu().front();
   std::int16_t high = low;
   for (const std::int16_t hu : values.hu()) {
@@ -205,7 +204,7 @@ void keep_body(const CtGrid& grid,
                      (removal.parts_kept == 1 ? " part" : " parts") + " kept");
 }
 
-/// Permutation and signs that bring a grid's axes to ascending L, P, S.
+/// Permutation and signs that turn a grid's axes into ascending L, P, S.
 struct AxisOrder {
   std::array<int, 3> axis = {0, 1, 2};  ///< of the grid, for L, P, S
   std::array<bool, 3> reversed = {false, false, false};

@@ -8,7 +8,7 @@
 
 namespace af {
 
-/// A CT as Hounsfield units, i fastest. Geometry is checked by the reader: direction orthonormal,
+/// A CT in Hounsfield units, i fastest. The reader checks the geometry: direction orthonormal,
 /// spacing positive.
 struct CtVolume {
   CtGrid grid;

@@ -8,8 +8,8 @@
 namespace af {
 namespace {
 
-/// How far in lies the layer that an outermost one is compared with. Less than the radius of the
-/// ends of bones, more than the partial volume of their surfaces.
+/// An outermost layer is compared with the layer this far inside. The distance is less than the
+/// radius of the ends of bones, and more than the partial volume of their surfaces.
 constexpr double kInsideMm = 2.0;
 
 /// Enough to cover the projection of a cut of 100 mm with points 2 mm apart.

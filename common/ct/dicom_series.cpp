@@ -69,7 +69,7 @@ std::string some_of(const std::vector<std::string>& names) {
   return text;
 }
 
-/// Of a folder without a DICOM image.
+/// What a folder without a DICOM image holds instead.
 std::string what_is_there(const std::vector<fs::path>& files,
                           const std::vector<std::string>& other_files,
                           const std::vector<std::string>& other_objects) {
@@ -92,7 +92,7 @@ std::vector<DicomElements> image_headers(const fs::path& folder,
       continue;
     }
     DicomElements header = DicomElements::read(path);
-    // DICOMDIR, reports, structure sets have no rows of pixels.
+    // DICOMDIR, reports and structure sets have no rows of pixels.
     if (header.text({0x0002, 0x0002}) == kMediaStorageDirectory ||
         header.text({0x0028, 0x0010}).empty())
       other_objects.push_back(name);
@@ -116,7 +116,7 @@ std::string describe(const DicomElements& header) {
   return "'" + description + "', modality " + header.text({0x0008, 0x0060});
 }
 
-/// The files of the one series, or of the one that was chosen.
+/// The files of the only series, or of the chosen one.
 std::vector<DicomElements> chosen_series(const fs::path& folder,
                                          std::vector<DicomElements> headers,
                                          const std::string& series_uid) {
@@ -161,8 +161,8 @@ void check_is_plain_ct(const DicomElements& header, std::vector<std::string>* wa
     warn(warnings, file + ": RescaleType = '" + units + "', read as HU");
 }
 
-/// The frame of reference of the slices that state one. InputError when they differ: positions are
-/// of one space within one frame only.
+/// The frame of reference of the slices that state one. Throws InputError when they differ:
+/// positions can only be compared within one frame.
 std::string frame_of_reference(const std::vector<DicomElements>& headers) {
   std::string frame;
   for (const DicomElements& header : headers) {
@@ -238,7 +238,7 @@ Eigen::Matrix3d orthonormal_axes(const Slice& slice) {
       (slice.row_direction.normalized() + slice.column_direction.normalized());
   const Eigen::Vector3d difference =
       (slice.row_direction.normalized() - slice.column_direction.normalized());
-  // Rows and columns share what they lack of a right angle.
+  // Rows and columns share their deviation from a right angle.
   const Eigen::Vector3d row = (sum.normalized() + difference.normalized()) / std::sqrt(2.0);
   Eigen::Matrix3d axes;
   axes.col(0) = row;
@@ -257,8 +257,8 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-/// The unit of the last decimal that some numbers were rounded to: of 1, 0.1, ... Whatever computed
-/// with them since has left a trace of arithmetic.
+/// The unit of the last decimal to which some numbers were rounded: 1, 0.1, ... Whatever has
+/// computed with them since has left a trace of arithmetic, which must not count as decimals.
 double last_decimal(const std::vector<double>& numbers) {
   constexpr int kMostDecimals = 6;
   constexpr double kArithmetic = 1e-3;
@@ -283,9 +283,10 @@ double position_rounding_mm(const std::vector<Slice>& slices, const Eigen::Vecto
   return rounding;
 }
 
-/// Whether slices are even but for the rounding of their positions, which stays below what shifts
-/// of slices are allowed, on either side. A missing slice of four or more puts another one at least
-/// a third of the spacing beside the even grid, which rounding by kMostGapShare of it cannot do.
+/// Whether slices are even except for the rounding of their positions. The rounding must stay below
+/// what shifts of slices are allowed, on either side. One missing slice of at least four puts
+/// another one a third of the spacing or more beside the even grid, which rounding by kMostGapShare
+/// of it cannot do.
 bool is_even_but_rounded(const std::vector<Slice>& slices,
                          const Eigen::Vector3d& normal,
                          const std::vector<double>& heights) {
@@ -302,8 +303,8 @@ bool is_even_but_rounded(const std::vector<Slice>& slices,
   return true;
 }
 
-/// Why slices are not evenly spaced; empty when they are. InputError for two at one position.
-/// `heights` ascend.
+/// Why slices are not evenly spaced; empty when they are. Throws InputError for two at one
+/// position. `heights` ascend.
 std::string unevenness(const fs::path& folder,
                        const std::vector<Slice>& slices,
                        const std::vector<double>& heights) {
@@ -346,7 +347,7 @@ std::string leaning(const std::vector<Slice>& slices, const Eigen::Vector3d& nor
   return {};
 }
 
-/// A tag that says tilt, though the slices' positions do not lean: one of the two is wrong.
+/// Names a tag that says tilt although the slices' positions do not lean: one of the two is wrong.
 std::string tilt_of_tags(const std::vector<Slice>& slices) {
   for (const Slice& slice : slices) {
     const auto tilt = slice.pixels.header.number_or_none({0x0018, 0x1120}, "GantryDetectorTilt");
@@ -356,11 +357,11 @@ std::string tilt_of_tags(const std::vector<Slice>& slices) {
   return {};
 }
 
-/// Slices in their order, and where they lie.
+/// Slices in order, and where they lie.
 struct PlacedSlices {
   SliceStack stack;
-  std::string trouble;   ///< why they are no upright, even grid; empty when they are
-  std::string rounding;  ///< what was taken for rounding of their positions; or empty
+  std::string trouble;   ///< why they do not form an upright, even grid; empty when they do
+  std::string rounding;  ///< what was taken for rounding of their positions; may be empty
   double largest_gap_mm = 0.0;
   double usual_gap_mm = 0.0;
 };
@@ -392,7 +393,7 @@ PlacedSlices placed(const fs::path& folder, std::vector<Slice>& slices) {
   return found;
 }
 
-/// The grid of slices as they are stored; even and upright ones only.
+/// The grid of slices as they are stored, which must be even and upright.
 CtGrid stored_grid(const SliceStack& stack) {
   const Eigen::Vector3d normal = stack.axes.col(2);
   const double length = normal.dot(stack.origins_mm.back() - stack.origins_mm.front());
@@ -405,10 +406,11 @@ CtGrid stored_grid(const SliceStack& stack) {
   return grid;
 }
 
-constexpr double kMostGrowth = 8.0;  ///< of the voxels, by resampling
-constexpr double kWidestGap = 3.5;   ///< of the usual one: three slices in a row are not made up
+constexpr double kMostGrowth = 8.0;  ///< how many times more voxels resampling may make
+constexpr double kWidestGap =
+    3.5;  ///< relative to the usual gap: three slices in a row are not made up
 
-/// The grid to resample a stack to; InputError when that is no small repair.
+/// The grid to resample a stack to. Throws InputError when that would be more than a small repair.
 CtGrid repaired_grid(const fs::path& folder, const PlacedSlices& slices) {
   const SliceStack& stack = slices.stack;
   if (stack.columns < 2 || stack.rows < 2)
@@ -429,7 +431,7 @@ CtGrid repaired_grid(const fs::path& folder, const PlacedSlices& slices) {
   return grid;
 }
 
-/// Adds the slices' pixels to a CT: padding becomes air, whatever its value means.
+/// Adds the slices' pixels to a CT. Padding becomes air, whatever its value means.
 class VoxelCollector {
  public:
   explicit VoxelCollector(HuValues& values) : values_(values) {}
@@ -452,7 +454,8 @@ class VoxelCollector {
     if (is_dense(low) || is_dense(high)) padded_ += pixels.padded;
   }
 
-  /// Of padding that would not have been air by its value, and of what is no padding after all.
+  /// Warns of padding whose value would not have been air, and of values that are not padding after
+  /// all.
   void warn_of_padding(const std::string& folder, std::vector<std::string>* warnings) const {
     if (padded_ > 0)
       warn(warnings,
@@ -531,7 +534,7 @@ DicomCt read_dicom_series(const fs::path& folder,
   VoxelCollector voxels(ct.values);
   for (const Slice& slice : slices) {
     voxels.add(slice.pixels);
-    // Only now is it known that the pixels are there which the headers promise.
+    // Memory is reserved only now, when the pixels that the headers promise are known to be there.
     ct.values.reserve(stored_voxels);
   }
   voxels.warn_of_padding(folder.string(), warnings);

@@ -17,16 +17,16 @@ struct DicomCt {
   HuValues values;  ///< rescaled, i fastest, slices ascending along the slice normal
 };
 
-/// The regular files that stand in a folder itself, by name. FileError when it cannot be listed.
+/// The regular files directly in a folder, by name. Throws FileError when it cannot be listed.
 std::vector<std::filesystem::path> files_of(const std::filesystem::path& folder);
 
 /// True when a folder holds at least one DICOM file.
 bool holds_dicom(const std::filesystem::path& folder);
 
 /// Reads the CT series of a DICOM folder (GDCM). Slices are ordered by position along the slice
-/// normal, never by name or number; what leans or is uneven is resampled if `options` say so, with
-/// a warning that tells by how much. Errors as read_ct() says; files that are no images of a series
-/// are skipped with a warning.
+/// normal, never by name or number. What leans or is uneven is resampled if `options` say so, with
+/// a warning that tells by how much. Errors are those of read_ct(). Files that are no images of a
+/// series are skipped with a warning.
 DicomCt read_dicom_series(const std::filesystem::path& folder,
                           const CtReadOptions& options,
                           std::vector<std::string>* warnings);

@@ -15,12 +15,12 @@
 
 namespace af {
 
-/// Numbers of a CT's file as HU.
+/// Turns the numbers of a CT's file into HU.
 class HuConversion {
  public:
-  /// The numbers are HU.
+  /// For numbers that are HU already.
   HuConversion() = default;
-  /// InputError for options with problems.
+  /// Throws InputError for options with problems.
   explicit HuConversion(const CtReadOptions& options);
   [[nodiscard]] bool is_identity() const { return kind_ == Kind::Hu; }
   [[nodiscard]] double hu(double number) const;
@@ -33,11 +33,11 @@ class HuConversion {
   std::vector<std::pair<double, double>> labels_;  ///< number, HU; by number
 };
 
-/// Collects voxels as int16 HU and counts what does not fit.
+/// Collects voxels as int16 HU, and counts what does not fit.
 class HuValues {
  public:
   HuValues() = default;
-  /// Numbers are turned into HU first.
+  /// Numbers are converted to HU first.
   explicit HuValues(HuConversion conversion) : conversion_(std::move(conversion)) {}
 
   void reserve(std::size_t voxels) { hu_.reserve(voxels); }
@@ -48,7 +48,7 @@ class HuValues {
     constexpr double kLow = std::numeric_limits<std::int16_t>::min();
     constexpr double kHigh = std::numeric_limits<std::int16_t>::max();
     const double rounded = std::nearbyint(hu);
-    // Written so that NaN takes the second branch.
+    // NaN fails both comparisons and takes the second branch.
     if (rounded >= kLow && rounded <= kHigh) {
       hu_.push_back(static_cast<std::int16_t>(rounded));
       return;
@@ -86,7 +86,7 @@ class HuValues {
   [[nodiscard]] double first_implausible_hu() const { return first_implausible_hu_; }
   [[nodiscard]] const std::vector<std::int16_t>& hu() const { return hu_; }
   [[nodiscard]] std::vector<std::int16_t> take() { return std::move(hu_); }
-  /// Puts the voxels of another grid in place of these; counts stay.
+  /// Replaces these voxels by those of another grid; counts stay.
   void replace(std::vector<std::int16_t> hu) { hu_ = std::move(hu); }
 
  private:

@@ -16,12 +16,12 @@ namespace af {
 
 namespace {
 
-/// The part of a ray (origin + t * direction, voxel indices) inside the volume; empty when end <=
+/// The part of a ray (origin + t * direction, voxel indices) inside the volume. Empty when end <=
 /// begin.
 struct Interval {
   double begin;
   double end;
-  int begin_axis = RayPath::kNoFace;  ///< of the face that cuts it off there
+  int begin_axis = RayPath::kNoFace;  ///< axis of the face that cuts it off there
   int end_axis = RayPath::kNoFace;
 };
 
@@ -65,15 +65,15 @@ class BundleMaker {
     row_step_ = index_from_mm * fan.row_step;
     for (int axis = 0; axis < 3; ++axis) {
       const int last = grid.size[static_cast<std::size_t>(axis)] - 1;
-      // Keeps single precision positions inside the border cells, whose outermost part attenuates
-      // almost nothing.
+      // The margin keeps single-precision positions inside the border cells, whose outermost part
+      // attenuates almost nothing.
       const double margin = std::max(1e-3, 2e-6 * last);
       low_[axis] = margin;
       high_[axis] = last - margin;
     }
   }
 
-  /// The sums of one lane as the mechanics want them.
+  /// The sums of one lane, as the mechanics need them.
   [[nodiscard]] RaySums ray_sums(float weight_mm,
                                  float mu_per_mm_per_unit,
                                  const SlopeSums& sums,
@@ -102,7 +102,8 @@ class BundleMaker {
             static_cast<int>(samples_of(length_mm(inside, direction)))};
   }
 
-  /// Fills a bundle with `count` rays of a row from `column` on, and the weights of their samples.
+  /// Fills a bundle with `count` rays of a row from `column` on, and writes the weights of their
+  /// samples.
   void fill(int column, int row, int count, RayBundle& bundle, LaneValues& weights_mm) const {
     for (int lane = 0; lane < RayBundle::kRays; ++lane) {
       const auto i = static_cast<std::size_t>(lane);
@@ -115,8 +116,8 @@ class BundleMaker {
   }
 
  private:
-  /// Fills lane `lane` with ray (column, row); returns the weight of its samples in mm (0 when it
-  /// misses).
+  /// Fills lane `lane` with ray (column, row). Returns the weight of its samples in mm, 0 when it
+  /// misses.
   float fill_lane(int column, int row, int lane, RayBundle& bundle) const {
     const Eigen::Vector3d direction = direction_of(column, row);
     const Interval inside = inside_of(direction);
@@ -147,8 +148,8 @@ class BundleMaker {
   [[nodiscard]] Eigen::Vector3d direction_of(int column, int row) const {
     return first_ + column * column_step_ + row * row_step_;
   }
-  /// Empty, too, where its ends are not in the volume all the same, or its length is no number: the
-  /// source is so far away that they are lost in rounding, or the ray has no direction.
+  /// Also empty where its ends turn out to lie outside the volume or its length is not a number:
+  /// the source is so far away that rounding loses them, or the ray has no direction.
   [[nodiscard]] Interval inside_of(const Eigen::Vector3d& direction) const {
     const Interval inside = clip_to_volume(layer_, origin_, direction, low_, high_);
     for (const double at : {inside.begin, inside.end}) {
@@ -194,7 +195,7 @@ class FanCaster {
                     });
   }
 
-  /// `planes`: six of as many values.
+  /// `planes`: six planes of the same size.
   void cast_row(int row,
                 const RayMechanics& mechanics,
                 std::span<float> values,
@@ -248,7 +249,7 @@ class FanCaster {
                                          kernels_512::sum_bundle_with_slopes);
 };
 
-/// Calls work(row) for the rows of a fan, shared by the threads of a pool, when there is one.
+/// Calls work(row) for the rows of a fan. The threads of a pool share them, when there is one.
 template <typename Work>
 void for_each_row(const RayFan& fan, ThreadPool* pool, const Work& work) {
   if (pool != nullptr) {

@@ -29,7 +29,7 @@ AF_KERNEL_INLINE Floats mix(Floats a, Floats b, Floats weight) {
   return a + weight * (b - a);
 }
 
-/// The interpolant on a face of a cell, i fixed.
+/// The interpolant on a face of a cell with fixed i.
 struct Face {
   Floats value;
   Floats slope_y;
@@ -45,7 +45,7 @@ face_of(Floats at_00, Floats at_10, Floats at_01, Floats at_11, Floats weight_y,
   return {value_0 + weight_z * slope_z, mix(edge_0, edge_1, weight_z), slope_z};
 }
 
-/// The interpolant at one point of each ray, its slopes per voxel.
+/// The interpolant at one point of each ray, and its slopes per voxel.
 struct Sample {
   Floats value;
   Floats slope[3];
@@ -96,8 +96,8 @@ AF_KERNEL_INLINE Sample sample(const VoxelView& volume, const Rays& rays, Floats
                 rays.start[2] + number * rays.step[2]);
 }
 
-/// Calls add(sample, number, is_inside) for the samples of all rays in turn. Lanes that are done
-/// sample their first position again.
+/// Calls add(sample, number, is_inside) for the samples of all rays in turn. Finished lanes sample
+/// their first position again.
 template <typename Add>
 AF_KERNEL_INLINE void for_each_sample(const VoxelView& volume, const Rays& rays, Add add) {
   for (int32_t k = 0;; ++k) {
@@ -108,7 +108,7 @@ AF_KERNEL_INLINE void for_each_sample(const VoxelView& volume, const Rays& rays,
   }
 }
 
-/// SlopeSums::stretched_begin or, by a growth of 1 and numbers backwards from the last, the end.
+/// SlopeSums::stretched_begin. With a growth of 1 and numbers backwards from the last, the end.
 template <typename NumberOf>
 AF_KERNEL_INLINE Floats
 stretched(const VoxelView& volume, const Rays& rays, float growth, NumberOf number_of) {
@@ -150,7 +150,7 @@ void sum_bundle_with_slopes(const VoxelView& volume, const RayBundle& bundle, Sl
       value += is_inside ? at.value : splat(0.0f);
       for (int axis = 0; axis < 3; ++axis) {
         slope[axis] += is_inside ? at.slope[axis] : splat(0.0f);
-        numbered[axis] += number * at.slope[axis];  // done lanes have number 0
+        numbered[axis] += number * at.slope[axis];  // finished lanes have number 0
       }
     });
     store(sums.values + first, value);

@@ -5,7 +5,7 @@
 
 namespace af {
 
-/// Sixteen rays, cut to the volume, in voxel indices: sample k of ray r is at start + k * step.
+/// Sixteen rays, cut to the volume, in voxel indices. Sample k of ray r is at start + k * step.
 struct RayBundle {
   static constexpr int kRays = 16;
   float start[3][kRays];
@@ -13,8 +13,8 @@ struct RayBundle {
   int32_t samples[kRays];
 };
 
-/// Voxels of a bordered volume, i fastest; sample positions stay at least a border cell's edge
-/// inside.
+/// Voxels of a bordered volume, i fastest. Sample positions stay inside by at least a border cell's
+/// edge.
 struct VoxelView {
   const uint16_t* voxels;
   int32_t row_stride;    ///< elements from (i, j, k) to (i, j + 1, k)
@@ -27,11 +27,12 @@ using SumBundle = void (*)(const VoxelView& volume, const RayBundle& bundle, flo
 /// Sums over the samples of each ray, in units of the voxels.
 struct SlopeSums {
   float values[RayBundle::kRays];
-  float slopes[3][RayBundle::kRays];           ///< of the interpolant, per voxel along i, j, k
+  float slopes[3][RayBundle::kRays];  ///< slopes of the interpolant, per voxel along i, j, k
   float numbered_slopes[3][RayBundle::kRays];  ///< each times the sample's number k
-  /// Change of the sum when an end moves along the ray by one step: its first (last) kStretched
+  /// Change of the sum when an end moves along the ray by one step. Its first (last) kStretched
   /// samples, or all when there are fewer, move along with it, less and less, and their weights
-  /// change to match. About 0 in air; the attenuation there where the volume's face cuts a body.
+  /// change to match. It is about 0 in air, and the attenuation there where the volume's face cuts
+  /// a body.
   static constexpr int kStretched = 16;
   float stretched_begin[RayBundle::kRays];
   float stretched_end[RayBundle::kRays];

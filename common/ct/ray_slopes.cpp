@@ -19,7 +19,7 @@ Eigen::Vector3d across(const Eigen::Vector3d& force, const Eigen::Vector3d& dire
 /// again.
 Eigen::Vector3d slide(const Eigen::Vector3d& direction, int axis) {
   if (axis == RayPath::kNoFace) return direction;
-  // A ray along a face slides without end.
+  // A ray along a face would slide without end.
   constexpr double kLeastCosine = 1e-2;
   const double cosine =
       std::copysign(std::max(std::abs(direction[axis]), kLeastCosine), direction[axis]);

@@ -31,14 +31,14 @@ struct RaySums {
 };
 
 /// dU by the motions of MotionSlopes. Moving the volume moves the ray and its samples the other
-/// way, across the ray, so that the samples act like forces on the two ends of the path. Motion
-/// along the ray changes nothing within the volume. The ends slide along the faces that they lie
-/// on, which matters where a face cuts a body.
+/// way, across the ray, so the samples act like forces on the two ends of the path. Motion along
+/// the ray changes nothing within the volume. The ends slide along the faces that they lie on,
+/// which matters where a face cuts a body.
 class RayMechanics {
  public:
   RayMechanics(const CtGrid& grid, const MotionSlopes& motions);
 
-  /// Per rad about the axes, then per mm along them; 0 for a ray that misses.
+  /// Per rad about the axes, then per mm along them. 0 for a ray that misses.
   [[nodiscard]] std::array<float, 6> slopes_of(const RayPath& path, const RaySums& sums) const;
 
  private:

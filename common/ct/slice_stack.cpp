@@ -11,16 +11,16 @@ namespace af {
 namespace {
 
 constexpr std::int16_t kBesideSlicesHu = -1000;
-constexpr double kMostMore = 1e6;  ///< pixels; a grid this wide is refused by who asks for it
+constexpr double kMostMore = 1e6;  ///< pixels; callers refuse a grid this wide
 /// Rounding of positions, in pixels.
 constexpr double kTolerance = 1e-6;
 
 struct Place {
-  std::size_t slice = 0;  ///< the lower of two
-  double share = 0.0;     ///< of the upper one
+  std::size_t slice = 0;  ///< the lower of two slices
+  double share = 0.0;     ///< share of the upper slice
 };
 
-/// The slices about a height; heights ascend.
+/// The slices around a height. Heights ascend.
 Place place_of(const std::vector<double>& heights, double height) {
   const auto upper = std::upper_bound(heights.begin(), heights.end(), height);
   const auto last = static_cast<std::ptrdiff_t>(heights.size()) - 2;

@@ -12,10 +12,10 @@ namespace af {
 
 namespace {
 
-/// Scratch memory of the member as it is open now: one that is opened anew makes its own.
+/// Scratch memory for the member as it is open now. A member that is opened again makes its own.
 class MemberWorkspace final : public RenderWorkspace {
  public:
-  std::weak_ptr<const MemberLevels> of;
+  std::weak_ptr<const MemberLevels> levels;
   std::unique_ptr<RenderWorkspace> scratch;
 };
 
@@ -39,9 +39,9 @@ class MemberDrr final : public DrrRenderer {
     auto& own = dynamic_cast<MemberWorkspace&>(workspace);
     const std::shared_ptr<const MemberLevels> levels = members_->get(member_);
     const DrrRenderer& renderer = *levels->at(level_);
-    if (own.scratch == nullptr || own.of.lock() != levels) {
+    if (own.scratch == nullptr || own.levels.lock() != levels) {
       own.scratch = renderer.make_workspace();
-      own.of = levels;
+      own.levels = levels;
     }
     return renderer.render(room_from_ct, view, *own.scratch, total_attenuation, gradients);
   }

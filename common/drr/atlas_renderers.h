@@ -25,14 +25,14 @@ class MembersInUse {
  public:
   using Open = std::function<std::shared_ptr<const MemberLevels>(std::size_t member)>;
 
-  /// `open` is called by one thread at a time; get() throws what it throws. At least two members
-  /// are kept, because a seam needs two.
+  /// `open` is called by one thread at a time, and get() throws what it throws. At least two
+  /// members are kept, because a seam needs two.
   MembersInUse(Open open, std::size_t most);
 
   /// Returns the member, opened if need be. It stays usable for the caller after it is dropped
   /// here.
   std::shared_ptr<const MemberLevels> get(std::size_t member);
-  /// Keeps a member that was opened elsewhere, for good.
+  /// Keeps a member for good that was opened elsewhere.
   void keep(std::size_t member, std::shared_ptr<const MemberLevels> levels);
   [[nodiscard]] std::size_t count() const;
 
@@ -52,7 +52,7 @@ class MembersInUse {
   mutable ForkAwareMutex mutex_;
 };
 
-/// One level of every member, opened when it is rendered; level 0 are the DRRs themselves.
+/// One level of every member, opened when it is rendered; level 0 gives the DRRs themselves.
 /// `coverage`: the planes of every member. What is rendered does not depend on which members are in
 /// memory.
 std::vector<FieldSetMember> atlas_level(

@@ -64,7 +64,8 @@ AF_KERNEL_INLINE void store_nodes(F4 nodes, float* image, int64_t stride) {
   memcpy(image + stride, values + 2, 2 * sizeof(float));
 }
 
-// Sums over the four viewpoints of a tile, always in the order (0 + 2) + (1 + 3).
+// The sum over the four viewpoints of a tile is always in the order (0 + 2) + (1 + 3), so that
+// every vector width gives the same bits.
 #if AF_VECTOR_BITS == 512
 AF_KERNEL_INLINE F4 sum_over_viewpoints(Floats elements) {
   const F8 pairs = __builtin_shufflevector(elements, elements, 0, 1, 2, 3, 4, 5, 6, 7) +
@@ -110,14 +111,14 @@ AF_KERNEL_INLINE void blend_tile(const TileStrip& strip, int32_t d) {
 
 template <bool kWithSlopes, bool kHasMeans>
 AF_KERNEL_INLINE void blend_strip(const TileStrip& given) {
-  // A copy that no store can change.
+  // A copy, so that the compiler knows that no store changes it.
   const TileStrip strip = given;
   for (int32_t d = strip.tile_begin; d < strip.tile_end; ++d)
     blend_tile<kWithSlopes, kHasMeans>(strip, d);
 }
 
-/// A row of a block between two viewpoints along each axis, whose slopes are opposite. Rows are
-/// blended one after another: samples of far-apart poses are not in a cache, and memory is read
+/// Blends a row of a block between two viewpoints along each axis, whose slopes are opposite. Rows
+/// are blended one after another: samples of far-apart poses are not in a cache, and memory is read
 /// fastest in the order of its addresses.
 template <bool kWithSlopes>
 AF_KERNEL_INLINE void blend_row_between_two(const SampleBlock& block, int32_t row) {
@@ -143,7 +144,7 @@ AF_KERNEL_INLINE void blend_row_between_two(const SampleBlock& block, int32_t ro
   }
 }
 
-/// kLanes columns of a block from column c on.
+/// Blends kLanes columns of a block from column c on.
 template <bool kWithSlopes, int kTaps>
 AF_KERNEL_INLINE void blend_columns(const SampleBlock& block, int32_t c) {
   Floats u_weights[kMostTaps];
@@ -181,7 +182,7 @@ AF_KERNEL_INLINE void blend_columns(const SampleBlock& block, int32_t c) {
 
 template <bool kWithSlopes, int kTaps>
 AF_KERNEL_INLINE void blend_block(const SampleBlock& given) {
-  // A copy that no store can change.
+  // A copy, so that the compiler knows that no store changes it.
   const SampleBlock block = given;
   if constexpr (kTaps == 2)
     for (int32_t row = 0; row < block.rows; ++row) blend_row_between_two<kWithSlopes>(block, row);

@@ -9,9 +9,9 @@
 
 namespace af {
 
-/// The part of every voxel's attenuation that is bone (TissueModel::bone_part(), rounded to the
-/// volume's units of mu_water/1000), into memory laid out as the volume's voxels. Voxels are split
-/// before anything is interpolated or blurred, so the line integrals of the rest are water's.
+/// Writes the part of every voxel's attenuation that is bone into memory laid out as the volume's
+/// voxels (TissueModel::bone_part(), rounded to the volume's units of mu_water/1000). Voxels are
+/// split before anything is interpolated or blurred, so the line integrals of the rest are water's.
 void fill_bone_voxels(const AttenuationVolume& volume, std::span<std::uint16_t> voxels);
 
 /// A volume of those voxels on the same grid, in memory of this process.

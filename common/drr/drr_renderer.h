@@ -13,7 +13,7 @@
 
 namespace af {
 
-/// Side lengths of the widest region that registrations look at, relative to the study's region. A
+/// Side length of the widest region that registrations look at, relative to the study's region. A
 /// field must hold the rays of that widest region.
 inline constexpr double kWidestRegionScale = 2.0;
 
@@ -26,18 +26,18 @@ struct View {
   static View whole_detector(const CameraGeometry& camera);
   [[nodiscard]] std::size_t pixel_count() const { return roi.pixel_count(); }
   /// The region with its sides multiplied by `scale` about its centre and cut at the detector's
-  /// edges; at least one pixel.
+  /// edges. At least one pixel.
   [[nodiscard]] View scaled(double scale) const;
-  /// The same region seen by pixels `factor` times as wide and high: each lies on the centre of
+  /// The same region seen by pixels `factor` times as wide and high. Each lies at the centre of
   /// gravity of factor x factor pixels, counted from the region's corner. The coarse detector is
-  /// the region alone (roi.column = roi.row = 0); columns and rows that fill no coarse pixel are
+  /// the region alone (roi.column = roi.row = 0). Columns and rows that fill no coarse pixel are
   /// left out.
   [[nodiscard]] View coarser(int factor) const;
 };
 
 /// Request for pose derivatives: six planes of pixel_count() values, dU/d(rx, ry, rz) per rad, then
-/// dU/d(tx, ty, tz) per mm, of x_room -> p + t + Rz Ry Rx (x_room - p) applied after room_from_ct,
-/// at zero, p being `pivot_room_point`.
+/// dU/d(tx, ty, tz) per mm. The derivatives are at zero, of x_room -> p + t + Rz Ry Rx (x_room - p)
+/// applied after room_from_ct, where p is `pivot_room_point`.
 struct PoseGradients {
   Eigen::Vector3d pivot_room_point = Eigen::Vector3d::Zero();
   std::span<float> planes;
@@ -51,28 +51,28 @@ struct RenderStatus {
   [[nodiscard]] std::string text(const View& view) const;
 };
 
-/// Scratch memory of one thread; made by the renderer it is used with.
+/// Scratch memory of one thread, made by the renderer that uses it.
 class RenderWorkspace {
  public:
   virtual ~RenderWorkspace() = default;
 
   /// Allows or forbids a DRR to reuse what an earlier one, with gradients and from a nearby source,
-  /// left here (KeptImages): nearly the same values in half the time, but no longer a function of
-  /// the pose alone. Initially forbidden. Every call also discards what was left. Renderers that
-  /// leave nothing ignore it.
+  /// left here (KeptImages). That gives nearly the same values in half the time, but they are no
+  /// longer a function of the pose alone. Initially forbidden. Every call also discards what was
+  /// left. Renderers that leave nothing ignore it.
   virtual void reuse_images(bool /*is_allowed*/) {}
 };
 
 /// Makes DRRs of one CT. Fields and ray casting are compared by swapping this object. render() is
-/// const and re-entrant with one workspace per thread; results do not depend on threads or vector
+/// const, and re-entrant with one workspace per thread. Results do not depend on threads or vector
 /// width.
 class DrrRenderer {
  public:
   virtual ~DrrRenderer() = default;
 
-  /// Total attenuation of every ray of the view, dimensionless, row-major over view.roi, into
-  /// `total_attenuation` (view.pixel_count() values). Never extrapolates: rays outside are counted
-  /// and their pixels are 0.
+  /// Writes the total attenuation of every ray of the view into `total_attenuation`
+  /// (view.pixel_count() values): dimensionless, row-major over view.roi. Never extrapolates: rays
+  /// outside are counted, and their pixels are 0.
   virtual RenderStatus render(
       const RigidTransform& room_from_ct,
       const View& view,
@@ -80,8 +80,8 @@ class DrrRenderer {
       std::span<float> total_attenuation,
       const std::optional<PoseGradients>& gradients = std::nullopt) const = 0;
 
-  /// The rays_outside that render() would report, without making a DRR; 0 where nothing limits the
-  /// rays. \test TwoPassAfDrr.CountsTheRaysThatRenderingCounts
+  /// The rays_outside that render() would report, without making a DRR. It is 0 where nothing
+  /// limits the rays. \test TwoPassAfDrr.CountsTheRaysThatRenderingCounts
   [[nodiscard]] virtual std::int64_t rays_outside(const RigidTransform& /*room_from_ct*/,
                                                   const View& /*view*/) const {
     return 0;

@@ -16,8 +16,7 @@ namespace af {
 
 namespace {
 
-/// The `index`th of the poses by which a box is judged: its corners, then points of its faces and
-/// of its inside.
+/// Pose number `index` of those that test a box: its corners, then points on its faces and inside.
 PoseParameters pose_in_box(const MotionRange& box, int index) {
   constexpr int kCorners = 64;
   HashRandom random(29, static_cast<std::uint64_t>(index));

@@ -13,7 +13,7 @@
 
 namespace af {
 
-/// What fields hold of the rays of a view.
+/// How many of a view's rays the fields hold.
 struct ViewReach {
   std::string distance;   ///< FieldCoverage::distance_text()
   std::int64_t rays = 0;  ///< of the view
@@ -32,29 +32,30 @@ struct FieldCoverage {
   explicit FieldCoverage(const std::shared_ptr<const CompressedAttenuationField>& field);
   explicit FieldCoverage(const std::shared_ptr<const AttenuationAtlas>& atlas);
 
-  /// Rays of a view that the best field misses: the one that misses fewest.
+  /// Rays of a view that the best field misses, which is the field that misses fewest.
   [[nodiscard]] std::int64_t rays_outside(const RigidTransform& room_from_ct,
                                           const View& view) const;
-  /// 1 for each ray of a view that the best field holds, 0 for the others.
+  /// 1 for each ray of a view that the best field holds, and 0 for the others.
   [[nodiscard]] std::vector<float> held_rays(const RigidTransform& room_from_ct,
                                              const View& view) const;
   [[nodiscard]] ViewReach reach(const View& view,
                                 const PoseFrame& nominal,
                                 const MotionRange& proportion) const;
-  /// The largest box about the nominal pose of `frame`, in the proportion of `proportion`, whose
-  /// poses are all held by one of the fields or another. For one field it is covered_box(); for
-  /// several, kBoxPoses poses are tested, the box's corners first, so a ray between them may be
-  /// missed.
+  /// The largest box about the nominal pose of `frame`, in the proportion of `proportion`, in which
+  /// every pose is held by one field or another. For one field it is covered_box(). For several,
+  /// kBoxPoses poses are tested, the box's corners first, so a missed ray between them may go
+  /// unnoticed.
   [[nodiscard]] MotionRange box(const View& view,
                                 const PoseFrame& frame,
                                 const MotionRange& proportion) const;
   static constexpr int kBoxPoses = 512;
-  /// How far a camera is from the field's, or from that of the nearest member, which is named.
+  /// How far a camera is from the field's camera, or from that of the nearest member, which is
+  /// named.
   [[nodiscard]] std::string distance_text(const CameraGeometry& camera) const;
 };
 
-/// What a file's field or atlas was made from, and which rays it holds. Read by one rank alone, and
-/// quickly. FileError.
+/// What a file's field or atlas was made from, and which rays it holds. For one rank alone, and
+/// quick to read. Throws FileError.
 struct HeldRays {
   FieldIdentity identity;
   FieldCoverage coverage;

@@ -90,7 +90,7 @@ struct TileViewpoint {
   std::uint16_t* samples;
 };
 
-/// Viewpoint i = 2 du + dv of tile (a, b); without samples where it pads the last tiles.
+/// Viewpoint i = 2 du + dv of tile (a, b). It has no samples where it pads the last tiles.
 TileViewpoint viewpoint_of_tile(
     const SampleExtent& extent, int a, int b, int i, std::span<std::uint16_t> samples) {
   const int u = 2 * a + i / 2;
@@ -122,8 +122,7 @@ class Halving {
   HalvePlane halve_plane_;
 };
 
-/// Decodes viewpoint tiles of a slab whose tiles have no filter, for level 0 or, halved, for
-/// level 1.
+/// Decodes viewpoint tiles of a slab whose tiles have no filter. Gives level 0 or, halved, level 1.
 class TileDecoding {
  public:
   TileDecoding(std::shared_ptr<const CompressedAttenuationField> field,
@@ -214,7 +213,7 @@ class TileHalving {
   SlabGeometry coarse_;
 };
 
-/// The sum of a slab's levels, those of padded tiles included, as its codewords have them.
+/// The sum of a slab's levels as its codewords have them, including padded tiles.
 double codeword_levels(const CompressedAttenuationField& field, std::size_t slab) {
   const Codebook& codebook = field.codebook;
   const bool has_means = codebook.has_means();
@@ -235,7 +234,7 @@ double codeword_levels(const CompressedAttenuationField& field, std::size_t slab
   return static_cast<double>(total);
 }
 
-/// Level 0 or 1 of a field, slab by slab: `make_tile(slab, its halved geometry)` makes its tiles.
+/// Level 0 or 1 of a field, slab by slab. `make_tile(slab, its halved geometry)` makes its tiles.
 template <typename MakeTile>
 FieldLevel decoded_slabs(const CompressedAttenuationField& field,
                          int level,
@@ -281,7 +280,7 @@ FieldLevelSlab halved_slab(const std::shared_ptr<const FieldLevel>& from,
           from->slabs[slab].weight};
 }
 
-/// Of two slabs from `first` on.
+/// Merges two slabs from `first` on.
 FieldLevelSlab merged_slab(const std::shared_ptr<const FieldLevel>& from,
                            std::size_t first,
                            const FieldLevelMemory& memory) {
@@ -297,12 +296,12 @@ FieldLevelSlab merged_slab(const std::shared_ptr<const FieldLevel>& from,
   return {merging->geometry(), {extent, memory, make_tile}, slabs[0].weight + slabs[1].weight};
 }
 
-/// Memory for a level: up to `stepping_stones`, of this process.
+/// Memory for a level. Levels up to `stepping_stones` lie in memory of this process.
 FieldLevelMemory memory_of(int level, const FieldLevelMemory& memory, int stepping_stones) {
   return level <= stepping_stones ? process_memory() : memory;
 }
 
-/// From level 1 up to coarsest_level, each from the one before.
+/// Levels 1 to coarsest_level, each made from the one before.
 FieldLevels pyramid_from(FieldLevel level_1,
                          int coarsest_level,
                          const FieldLevelMemory& memory,
@@ -387,7 +386,7 @@ FieldLevel decode_halved_field(const std::shared_ptr<const CompressedAttenuation
 FieldLevel next_field_level(const std::shared_ptr<const FieldLevel>& level,
                             const FieldLevelMemory& memory) {
   FieldLevel result{level->level + 1, level->field_geometry, level->quantizer_step, {}};
-  // Level 1 keeps the slabs: with half the nodes they bear half the parallax, in nodes, and so do
+  // Level 1 keeps the slabs. With half the nodes they bear half the parallax, in nodes, and so do
   // the merged slabs of all further levels.
   const std::size_t together = result.level == 1 ? 1 : 2;
   for (std::size_t k = 0; k < level->slabs.size(); k += together)

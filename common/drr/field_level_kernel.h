@@ -15,8 +15,8 @@ struct TilePlane {
   bool has_means;
 };
 
-/// Decodes the four viewpoints (du, dv) = 00, 01, 10, 11 of a tile plane into `planes` (null: not
-/// wanted), each [t][s] with `stride` samples from row to row.
+/// Decodes the four viewpoints (du, dv) = 00, 01, 10, 11 of a tile plane into `planes`, each [t][s]
+/// with `stride` samples from row to row. Null: not wanted.
 using DecodeTiles = void (*)(const TilePlane& tiles, int32_t stride, uint16_t* const planes[4]);
 
 /// out[r][c] = round(sum of w_i w_j in[2r + i][2c + j]), w = (1 3 3 1)/8; exact integers. `sums`

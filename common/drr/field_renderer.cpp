@@ -19,7 +19,7 @@ using PoolPointer = std::shared_ptr<ThreadPool>;
 struct KnownLookUp {
   const char* name = nullptr;
   const char* help = nullptr;
-  /// What searches take of several slabs instead; null: this one.
+  /// The look-up that searches take instead where there are several slabs. Null: this one.
   const char* of_searches = nullptr;
   RendererPointer (*make)(FieldPointer field, const PoolPointer& pool) = nullptr;
   RendererPointer (*make_decoded)(LevelPointer level_0, const PoolPointer& pool) = nullptr;
@@ -46,7 +46,7 @@ constexpr KnownLookUp two_pass(const char* name,
 
 using enum AxisInterpolation;
 
-/// Every way of looking up there is; a new one joins here.
+/// Every way of looking up. A new one is added here.
 constexpr std::array kLookUps = {
     KnownLookUp{
         "nearest", "nearest node", nullptr, make_literal<FieldInterpolation::Nearest>, nullptr},

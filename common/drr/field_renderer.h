@@ -22,8 +22,8 @@ std::string field_look_up_help();
 /// near to the truth (docs/earlier-designs.md#eight-slabs).
 std::string look_up_of_searches(const std::string& own, std::size_t slab_count);
 
-/// The renderer for a name of field_look_up_names(); InputError for any other name. The threads of
-/// `pool` share a large DRR, except for "nearest" and "quadrilinear".
+/// The renderer for a name of field_look_up_names(). Throws InputError for any other name. The
+/// threads of `pool` share a large DRR, except for "nearest" and "quadrilinear".
 std::shared_ptr<const DrrRenderer> make_field_renderer(
     std::shared_ptr<const CompressedAttenuationField> field,
     const std::string& look_up,

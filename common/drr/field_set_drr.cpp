@@ -14,14 +14,14 @@ namespace af {
 
 namespace {
 
-/// Members that hold a pose by so much less than the best are not looked up: narrow enough that few
-/// poses need two look-ups, wide enough that an optimiser's steps see a smooth change. In units of
-/// how_well_held().
+/// In units of how_well_held(). Members that hold a pose less well than the best by this much are
+/// not looked up. The seam is narrow enough that few poses need two look-ups, and wide enough that
+/// an optimiser's steps see a smooth change.
 constexpr double kSeam = 0.4;
 
 /// How well a field holds a view's rays: the sum over its axes of the logarithm of how far they
-/// keep from the edges. It falls without bound where rays leave a plane, and an axis along which
-/// two fields hold the rays alike says nothing between them. None where a ray is outside.
+/// keep from the edges. It falls without bound where rays leave a plane. An axis along which two
+/// fields hold the rays alike does not favour either. None where a ray is outside.
 std::optional<double> how_well_held(const SlabRays& rays) {
   double sum = 0.0;
   for (const double share : rays.shares_to_edges()) {
@@ -49,15 +49,15 @@ std::vector<double> FieldSetDrr::weights(const RigidTransform& room_from_ct,
   std::vector<std::optional<double>> held;
   for (const FieldSetMember& member : members_)
     held.push_back(how_well_held(SlabRays(*member.field_geometry, room_from_ct, view)));
-  // None is below any number.
+  // An empty optional is below any number.
   const std::optional<double> best = *std::max_element(held.begin(), held.end());
   std::vector<double> weights(members_.size(), 0.0);
   if (!best) return weights;
   double sum = 0.0;
   for (std::size_t i = 0; i < held.size(); ++i) {
     if (!held[i]) continue;
-    // The weight falls to 0 as a member ceases to be nearly the best, so before it loses a ray that
-    // another holds.
+    // The weight falls to 0 as a member ceases to be nearly the best. This happens before it loses
+    // a ray that another holds.
     const double behind = std::max(0.0, 1.0 - (*best - *held[i]) / kSeam);
     weights[i] = behind * behind;
     sum += weights[i];

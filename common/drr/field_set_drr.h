@@ -9,23 +9,24 @@
 
 namespace af {
 
-/// One field of a set, and what renders it (or one level of it).
+/// One field of a set, and what renders it or one of its levels.
 struct FieldSetMember {
   std::shared_ptr<const LightSlab> field_geometry;
   std::shared_ptr<const DrrRenderer> renderer;
 };
 
 /// DRRs from several fields of one CT, such as those of a C-arm's angles. A pose is looked up in
-/// the field that holds its rays best: where they stay farthest from the planes' edges, in shares
+/// the field that holds its rays best: where they stay farthest from the planes' edges, as shares
 /// of the planes' sizes, multiplied over all axes. Where two fields are nearly as good, both are
-/// looked up and their DRRs averaged with weights that are continuous in the pose, so that a
-/// registration can cross a seam. A DRR depends on its pose alone, not on earlier poses: results
-/// are the same on any number of threads. A pose that no field holds completely is rendered by the
-/// field that misses fewest rays. Gradients leave out the change of the weights, which multiplies
-/// the difference of two fields' errors. \test FieldSetDrrTest.HasNoJumpAtASeam
+/// looked up and their DRRs averaged. The weights are continuous in the pose, so a registration can
+/// cross a seam.
+/// A DRR depends on its pose alone, not on earlier poses, so results are the same on any number of
+/// threads. A pose that no field holds completely is rendered by the field that misses fewest rays.
+/// Gradients leave out the change of the weights, which multiplies the difference of two fields'
+/// errors. \test FieldSetDrrTest.HasNoJumpAtASeam
 class FieldSetDrr final : public DrrRenderer {
  public:
-  /// At least one member.
+  /// Takes at least one member.
   explicit FieldSetDrr(std::vector<FieldSetMember> members);
 
   RenderStatus render(const RigidTransform& room_from_ct,
@@ -38,8 +39,8 @@ class FieldSetDrr final : public DrrRenderer {
   [[nodiscard]] std::unique_ptr<RenderWorkspace> make_workspace() const override;
   [[nodiscard]] const char* name() const override { return "field"; }
 
-  /// The weight of each member at a pose. They add up to 1, or are all 0 where no member holds all
-  /// rays.
+  /// The weight of each member at a pose. Weights add up to 1, or are all 0 where no member holds
+  /// all rays.
   [[nodiscard]] std::vector<double> weights(const RigidTransform& room_from_ct,
                                             const View& view) const;
 

@@ -13,8 +13,8 @@ namespace af {
 
 namespace {
 
-/// Rows of tiles along t that are decoded together, while their coefficients stay in cache; those
-/// before and after them are needed, too.
+/// Rows of tiles along t that are decoded together, while their coefficients stay in cache. The
+/// rows before and after them are needed, too.
 constexpr int kRowsTogether = 8;
 constexpr int kRowsHeld = kRowsTogether + 2;
 
@@ -22,8 +22,8 @@ struct TileCounts {
   int u, v, s, t;
 };
 
-/// Coefficients of the rows in work, of a tile of viewpoints and its eight neighbours,
-/// [3 (du + 1) + dv + 1][row][coefficient][s], and the levels of one row of tiles.
+/// Coefficients of the rows in work, [3 (du + 1) + dv + 1][row][coefficient][s], for a tile of
+/// viewpoints and its eight neighbours; and the levels of one row of tiles.
 class Window {
  public:
   explicit Window(int s_tiles)
@@ -38,7 +38,7 @@ class Window {
   [[nodiscard]] std::size_t row_stride() const { return kTileElements * row_; }
   /// Coefficient 0 of the first tile of the first row that is held.
   [[nodiscard]] float* tiles(int neighbour) {
-    // With one tile before it, which is 0, as those behind it.
+    // One tile before it is 0, like those behind it.
     return coefficients_.data() + static_cast<std::size_t>(neighbour) * kRowsHeld * row_stride() +
            1;
   }
@@ -125,7 +125,7 @@ void ViewpointTileDecoding::fill(int neighbour, int first_row, int rows) {
       float* tile =
           window_.tiles(neighbour) + static_cast<std::size_t>(r) * window_.row_stride() + s;
       const int t = first_row + r;
-      // Codeword 0, an empty tile, stands for tiles that are not stored, too.
+      // Codeword 0, an empty tile, also stands for tiles that are not stored.
       const std::uint16_t* value = nullptr;
       if (t >= 0 && t < tiles_.t)
         value = values_.data() + first_value + static_cast<std::size_t>(s) * values_per_row + t;

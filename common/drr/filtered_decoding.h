@@ -17,8 +17,8 @@ class FilteredDecoding {
  public:
   explicit FilteredDecoding(std::shared_ptr<const CompressedAttenuationField> field);
 
-  /// The viewpoints of tile (a, b) of a slab into all samples of the slab, [u][v][t][s] as
-  /// FieldLevelSlab has them. Re-entrant.
+  /// Decodes the viewpoints of tile (a, b) of a slab into all samples of the slab, [u][v][t][s] as
+  /// in FieldLevelSlab. Re-entrant.
   void decode(std::size_t slab, int a, int b, std::span<std::uint16_t> samples) const;
 
  private:

@@ -17,8 +17,8 @@ constexpr double kBoneReach = 8.0;
 constexpr int kStraight = 2;
 constexpr int kUnknowns = kStraight + HardeningPolynomial::kAllTerms;
 
-/// Coordinates are the kernel's, rounded to single precision as it has them: then their rounding is
-/// no error of the fit.
+/// Coordinates are rounded to single precision as in the kernel, so that their rounding is no error
+/// of the fit.
 void place_coordinates(const Eigen::Vector2d& hardest, double knee, HardeningPolynomial& fit) {
   fit.reach[0] = static_cast<float>(kWaterReach);
   fit.reach[1] = static_cast<float>(kBoneReach);
@@ -31,12 +31,12 @@ void place_coordinates(const Eigen::Vector2d& hardest, double knee, HardeningPol
   fit.log_scale = static_cast<float>(1.0 / std::log2(most));
 }
 
-/// What U's coefficients are multiplied by: the two straight ones, then the terms in their order.
+/// The factors of U's coefficients: the two straight ones, then the terms in their order.
 Eigen::RowVectorXd basis_at(const HardeningPolynomial& fit, double water, double bone) {
-  const auto of = [&](const float(&factors)[2]) {
+  const auto weighted = [&](const float(&factors)[2]) {
     return static_cast<double>(factors[0]) * water + static_cast<double>(factors[1]) * bone;
   };
-  const double x = static_cast<double>(fit.log_scale) * std::log2(1.0 + of(fit.hard));
+  const double x = static_cast<double>(fit.log_scale) * std::log2(1.0 + weighted(fit.hard));
   Eigen::RowVectorXd basis(kUnknowns);
   basis[0] = water;
   basis[1] = bone;
@@ -47,13 +47,13 @@ Eigen::RowVectorXd basis_at(const HardeningPolynomial& fit, double water, double
       basis[kStraight + HardeningPolynomial::kFirst[j] + i] = term;
       term *= 2.0 * x - 1.0;
     }
-    power_of_a *= of(fit.tilt);
+    power_of_a *= weighted(fit.tilt);
   }
   return basis;
 }
 
-/// Least squares do not come out the same to the last bit where exp() and log() do not; on a grid
-/// this coarse they do. kAllTerms halves of it are below 4e-5 of U.
+/// Rounds to a grid. Where exp() and log() differ in the last bit, least squares do too; on a grid
+/// this coarse they agree. kAllTerms halves of it are below 4e-5 of U.
 float on_grid(double value) {
   constexpr double kGrid = 1.0 / (1 << 18);
   return static_cast<float>(std::round(value / kGrid) * kGrid);
@@ -86,7 +86,7 @@ Nodes nodes_of(const std::function<double(double, double)>& attenuation) {
   return nodes;
 }
 
-/// Finds straight part and terms; the largest weighted residual.
+/// Finds the straight part and the terms. Returns the largest weighted residual.
 double solve(const Nodes& nodes, HardeningPolynomial& fit) {
   const Eigen::Index count = nodes.attenuation.size();
   Eigen::MatrixXd basis(count, kUnknowns);
@@ -102,7 +102,7 @@ double solve(const Nodes& nodes, HardeningPolynomial& fit) {
   return (basis * found - wanted).cwiseAbs().maxCoeff();
 }
 
-/// Along which both materials' coefficients spread most over the energies; of length 1.
+/// The unit direction along which the coefficients of both materials spread most over the energies.
 Eigen::Vector2d hardest_direction(const std::vector<HardeningBin>& spectrum) {
   double sum = 0.0;
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
@@ -129,7 +129,7 @@ HardeningPolynomial fitted_hardening(const std::vector<HardeningBin>& spectrum,
   const Nodes nodes = nodes_of(attenuation);
   HardeningPolynomial best{};
   double least = std::numeric_limits<double>::infinity();
-  // How much attenuation hardens a beam depends on its filter.
+  // The knee depends on the filter of the beam, so the best of several is taken.
   for (const double knee : {0.03, 0.1, 0.3}) {
     HardeningPolynomial fit{};
     fit.slope_of_air = static_cast<float>(slope_of_air);

@@ -16,8 +16,8 @@ using native::store;
 
 constexpr float kLog2E = 1.44269504f;
 
-/// log2(y) of y at least 1, but for a few roundings and 5e-8 of the series that is cut off:
-/// y = 2^e m with m around 1, and log(m) = 2 atanh((m - 1) / (m + 1)).
+/// log2(y) for y >= 1, to a few roundings and the 5e-8 of the truncated series: y = 2^e m with m
+/// around 1, and log(m) = 2 atanh((m - 1) / (m + 1)).
 AF_KERNEL_INLINE Floats log2_of(Floats y) {
   constexpr int32_t kRootOfHalf = 0x3f3504f3;
   const Ints bits = reinterpret_cast<Ints>(y);
@@ -30,60 +30,62 @@ AF_KERNEL_INLINE Floats log2_of(Floats y) {
   return native::to_float(exponent) + s * series;
 }
 
-/// What the ray holds, within what can be and what the polynomial reaches.
+/// What the ray holds, limited to possible values and to the reach of the polynomial.
 struct Materials {
   Floats water, bone;
-  Floats water_beyond, bone_beyond;  ///< the reaches
+  Floats water_beyond, bone_beyond;  ///< what exceeds the reaches
 };
 
-AF_KERNEL_INLINE Materials materials_of(const HardeningPolynomial& of, Floats all, Floats bone) {
+AF_KERNEL_INLINE Materials materials_of(const HardeningPolynomial& polynomial,
+                                        Floats all,
+                                        Floats bone) {
   const Floats ray = native::maximum(all, splat(0.0f));
   const Floats ray_bone = native::minimum(native::maximum(bone, splat(0.0f)), ray);
   const Floats ray_water = ray - ray_bone;
   Materials found{};
-  found.water = native::minimum(ray_water, splat(of.reach[0]));
-  found.bone = native::minimum(ray_bone, splat(of.reach[1]));
+  found.water = native::minimum(ray_water, splat(polynomial.reach[0]));
+  found.bone = native::minimum(ray_bone, splat(polynomial.reach[1]));
   found.water_beyond = ray_water - found.water;
   found.bone_beyond = ray_bone - found.bone;
   return found;
 }
 
-/// Powers that polynomials of z take: short chains, for a processor waits for each of their links.
+/// Powers that polynomials of z take. Chains are short, because a processor waits for each link.
 struct Powers {
   Floats z, z2, z4;
 };
 
 /// Two to four terms.
 template <int kCount>
-AF_KERNEL_INLINE Floats short_sum(const float* terms, const Powers& of) {
-  const Floats low = terms[0] + terms[1] * of.z;
+AF_KERNEL_INLINE Floats short_sum(const float* terms, const Powers& z_powers) {
+  const Floats low = terms[0] + terms[1] * z_powers.z;
   if (kCount == 2) return low;
-  if (kCount == 3) return low + terms[2] * of.z2;
-  return low + (terms[2] + terms[3] * of.z) * of.z2;
+  if (kCount == 3) return low + terms[2] * z_powers.z2;
+  return low + (terms[2] + terms[3] * z_powers.z) * z_powers.z2;
 }
 
 /// sum_i terms[i] z^i of at most eight terms.
 template <int kCount>
-AF_KERNEL_INLINE Floats sum_of(const float* terms, const Powers& of) {
+AF_KERNEL_INLINE Floats sum_of(const float* terms, const Powers& z_powers) {
   if constexpr (kCount == 1)
     return splat(terms[0]);
   else if constexpr (kCount <= 4)
-    return short_sum<kCount>(terms, of);
+    return short_sum<kCount>(terms, z_powers);
   else if constexpr (kCount == 5)
-    return short_sum<4>(terms, of) + terms[4] * of.z4;
+    return short_sum<4>(terms, z_powers) + terms[4] * z_powers.z4;
   else
-    return short_sum<4>(terms, of) + short_sum<kCount - 4>(terms + 4, of) * of.z4;
+    return short_sum<4>(terms, z_powers) + short_sum<kCount - 4>(terms + 4, z_powers) * z_powers.z4;
 }
 
-/// sum_i c_ij z^i of one power of a, and its derivative by z.
+/// sum_i c_ij z^i for one power of a, and its derivative with respect to z.
 struct Row {
   Floats value, slope;
 };
 
 template <int kPower, bool kWithSlopes>
-AF_KERNEL_INLINE Row row_of(const HardeningPolynomial& of, const Powers& powers) {
+AF_KERNEL_INLINE Row row_of(const HardeningPolynomial& polynomial, const Powers& powers) {
   constexpr int kCount = HardeningPolynomial::kTerms[kPower];
-  const float* const terms = of.terms + HardeningPolynomial::kFirst[kPower];
+  const float* const terms = polynomial.terms + HardeningPolynomial::kFirst[kPower];
   Row row{sum_of<kCount>(terms, powers), splat(0.0f)};
   if (kWithSlopes) {
     float slopes[HardeningPolynomial::kTerms[0]];
@@ -93,12 +95,12 @@ AF_KERNEL_INLINE Row row_of(const HardeningPolynomial& of, const Powers& powers)
   return row;
 }
 
-/// U and its derivatives by water and bone.
+/// U and its derivatives with respect to water and bone.
 struct Hardened {
   Floats value, by_water, by_bone;
 };
 
-/// Where a ray lies on the polynomial.
+/// A ray's coordinates on the polynomial.
 struct Place {
   Floats y;  ///< 2^(x / log_scale)
   Floats a;
@@ -109,8 +111,10 @@ AF_KERNEL_INLINE Floats product(const float (&factors)[2], const Materials& ray)
   return factors[0] * ray.water + factors[1] * ray.bone;
 }
 
-AF_KERNEL_INLINE Place place_of(const HardeningPolynomial& of, const Materials& ray) {
-  return {1.0f + product(of.hard, ray), product(of.tilt, ray), product(of.straight, ray)};
+AF_KERNEL_INLINE Place place_of(const HardeningPolynomial& polynomial, const Materials& ray) {
+  return {1.0f + product(polynomial.hard, ray),
+          product(polynomial.tilt, ray),
+          product(polynomial.straight, ray)};
 }
 
 AF_KERNEL_INLINE Powers powers_of(Floats x) {
@@ -124,30 +128,31 @@ struct Rows {
 };
 
 template <bool kWithSlopes>
-AF_KERNEL_INLINE Rows rows_of(const HardeningPolynomial& of, Floats x) {
+AF_KERNEL_INLINE Rows rows_of(const HardeningPolynomial& polynomial, Floats x) {
   const Powers powers = powers_of(x);
-  return {row_of<0, kWithSlopes>(of, powers),
-          row_of<1, kWithSlopes>(of, powers),
-          row_of<2, kWithSlopes>(of, powers),
-          row_of<3, kWithSlopes>(of, powers)};
+  return {row_of<0, kWithSlopes>(polynomial, powers),
+          row_of<1, kWithSlopes>(polynomial, powers),
+          row_of<2, kWithSlopes>(polynomial, powers),
+          row_of<3, kWithSlopes>(polynomial, powers)};
 }
 
 AF_KERNEL_INLINE Floats sum_of_rows(const Rows& rows, Floats a) {
   return rows.r0.value + a * (rows.r1.value + a * (rows.r2.value + a * rows.r3.value));
 }
 
-AF_KERNEL_INLINE Hardened within_reach(const HardeningPolynomial& of, const Materials& ray) {
-  const Place place = place_of(of, ray);
-  const Floats x = of.log_scale * log2_of(place.y);
-  const Rows rows = rows_of<true>(of, x);
+AF_KERNEL_INLINE Hardened within_reach(const HardeningPolynomial& polynomial,
+                                       const Materials& ray) {
+  const Place place = place_of(polynomial, ray);
+  const Floats x = polynomial.log_scale * log2_of(place.y);
+  const Rows rows = rows_of<true>(polynomial, x);
   const Floats a = place.a;
   const Floats sum = sum_of_rows(rows, a);
   const Floats by_z = rows.r0.slope + a * (rows.r1.slope + a * (rows.r2.slope + a * rows.r3.slope));
   const Floats by_a = x * (rows.r1.value + a * (2.0f * rows.r2.value + 3.0f * a * rows.r3.value));
-  const Floats by_y = (sum + 2.0f * x * by_z) * (of.log_scale * kLog2E) / place.y;
+  const Floats by_y = (sum + 2.0f * x * by_z) * (polynomial.log_scale * kLog2E) / place.y;
   return {place.straight + x * sum,
-          of.straight[0] + by_y * of.hard[0] + by_a * of.tilt[0],
-          of.straight[1] + by_y * of.hard[1] + by_a * of.tilt[1]};
+          polynomial.straight[0] + by_y * polynomial.hard[0] + by_a * polynomial.tilt[0],
+          polynomial.straight[1] + by_y * polynomial.hard[1] + by_a * polynomial.tilt[1]};
 }
 
 AF_KERNEL_INLINE Hardened gone_on(Hardened at_reach, const Materials& ray) {
@@ -155,24 +160,24 @@ AF_KERNEL_INLINE Hardened gone_on(Hardened at_reach, const Materials& ray) {
   return at_reach;
 }
 
-/// U, and its derivatives by all and by bone where all stays.
+/// U, and its derivatives with respect to all and, where all stays, bone.
 struct WithSlopes {
   Floats value, by_all, by_bone;
 };
 
-AF_KERNEL_INLINE WithSlopes hardened_with_slopes(const HardeningPolynomial& of,
+AF_KERNEL_INLINE WithSlopes hardened_with_slopes(const HardeningPolynomial& polynomial,
                                                  Floats all,
                                                  Floats bone) {
   const Floats zero = splat(0.0f);
-  const Floats slope_of_air = splat(of.slope_of_air);
+  const Floats slope_of_air = splat(polynomial.slope_of_air);
   const Ints is_body = all > 0.0f;
-  if (!native::any(is_body)) return {of.slope_of_air * all, slope_of_air, zero};
-  const Materials ray = materials_of(of, all, bone);
-  const Hardened found = gone_on(within_reach(of, ray), ray);
+  if (!native::any(is_body)) return {polynomial.slope_of_air * all, slope_of_air, zero};
+  const Materials ray = materials_of(polynomial, all, bone);
+  const Hardened found = gone_on(within_reach(polynomial, ray), ray);
   const Ints is_all_bone = bone > all;
   const Floats by_all = is_all_bone ? found.by_bone : found.by_water;
   const Floats by_bone = (is_all_bone | (bone < 0.0f)) ? zero : found.by_bone - found.by_water;
-  return {is_body ? found.value : of.slope_of_air * all,
+  return {is_body ? found.value : polynomial.slope_of_air * all,
           is_body ? by_all : slope_of_air,
           is_body ? by_bone : zero};
 }
@@ -195,12 +200,12 @@ AF_KERNEL_INLINE void store_some(float* to, int64_t count, Floats value) {
   for (int64_t i = 0; i < count; ++i) to[i] = lanes[i];
 }
 
-/// Pixels that are taken through one step after the other. Each step is short, so that a processor
-/// works on several vectors of it at a time.
+/// Number of pixels that go through one step before the next begins. Each step is short, so that a
+/// processor works on several of its vectors at a time.
 constexpr int32_t kBlock = 256;
 
 /// `count`: a multiple of kLanes, at most kBlock.
-AF_KERNEL_INLINE void harden_block(const HardeningPolynomial& of,
+AF_KERNEL_INLINE void harden_block(const HardeningPolynomial& polynomial,
                                    int32_t count,
                                    float* all,
                                    const float* bone) {
@@ -211,8 +216,8 @@ AF_KERNEL_INLINE void harden_block(const HardeningPolynomial& of,
   Ints is_beyond = splat(0);
   for (int32_t i = 0; i < count; i += kLanes) {
     const Floats ray_all = load(all + i);
-    const Materials ray = materials_of(of, ray_all, load(bone + i));
-    const Place place = place_of(of, ray);
+    const Materials ray = materials_of(polynomial, ray_all, load(bone + i));
+    const Place place = place_of(polynomial, ray);
     is_body |= ray_all > 0.0f;
     is_beyond |= (ray.water_beyond > 0.0f) | (ray.bone_beyond > 0.0f);
     store(y + i, place.y);
@@ -223,25 +228,28 @@ AF_KERNEL_INLINE void harden_block(const HardeningPolynomial& of,
     for (int32_t i = 0; i < count; i += kLanes) {
       const Floats ray_all = load(all + i);
       const Floats ray_bone = load(bone + i);
-      store(all + i, hardened_with_slopes(of, ray_all, ray_bone).value);
+      store(all + i, hardened_with_slopes(polynomial, ray_all, ray_bone).value);
     }
     return;
   }
   if (!native::any(is_body)) {
-    for (int32_t i = 0; i < count; i += kLanes) store(all + i, of.slope_of_air * load(all + i));
+    for (int32_t i = 0; i < count; i += kLanes)
+      store(all + i, polynomial.slope_of_air * load(all + i));
     return;
   }
-  for (int32_t i = 0; i < count; i += kLanes) store(y + i, of.log_scale * log2_of(load(y + i)));
+  for (int32_t i = 0; i < count; i += kLanes)
+    store(y + i, polynomial.log_scale * log2_of(load(y + i)));
   for (int32_t i = 0; i < count; i += kLanes) {
     const Floats ray_all = load(all + i);
     const Floats x = load(y + i);
-    const Floats body = load(straight + i) + x * sum_of_rows(rows_of<false>(of, x), load(a + i));
-    store(all + i, ray_all > 0.0f ? body : of.slope_of_air * ray_all);
+    const Floats body =
+        load(straight + i) + x * sum_of_rows(rows_of<false>(polynomial, x), load(a + i));
+    store(all + i, ray_all > 0.0f ? body : polynomial.slope_of_air * ray_all);
   }
 }
 
 /// The same for any count below kLanes.
-AF_KERNEL_INLINE void harden_rest(const HardeningPolynomial& of,
+AF_KERNEL_INLINE void harden_rest(const HardeningPolynomial& polynomial,
                                   int32_t count,
                                   float* all,
                                   const float* bone) {
@@ -249,40 +257,37 @@ AF_KERNEL_INLINE void harden_rest(const HardeningPolynomial& of,
   float padded_bone[kLanes];
   store(padded, load_some(all, count));
   store(padded_bone, load_some(bone, count));
-  harden_block(of, kLanes, padded, padded_bone);
+  harden_block(polynomial, kLanes, padded, padded_bone);
   store_some(all, count, load(padded));
 }
 
 }  // namespace
 
-void harden_pixels(const HardeningPolynomial& polynomial,
-                   int64_t count,
-                   float* all,
-                   const float* bone) {
-  // A copy that no store can change.
-  const HardeningPolynomial of = polynomial;
+void harden_pixels(const HardeningPolynomial& given, int64_t count, float* all, const float* bone) {
+  // A copy, so that the compiler knows that no store changes it.
+  const HardeningPolynomial polynomial = given;
   int64_t i = 0;
   while (count - i >= kLanes) {
     const int64_t left = (count - i) / kLanes * kLanes;
     const auto now = static_cast<int32_t>(left < kBlock ? left : kBlock);
-    harden_block(of, now, all + i, bone + i);
+    harden_block(polynomial, now, all + i, bone + i);
     i += now;
   }
-  if (i < count) harden_rest(of, static_cast<int32_t>(count - i), all + i, bone + i);
+  if (i < count) harden_rest(polynomial, static_cast<int32_t>(count - i), all + i, bone + i);
 }
 
-void harden_with_slopes(const HardeningPolynomial& polynomial,
+void harden_with_slopes(const HardeningPolynomial& given,
                         int64_t count,
                         float* all,
                         const float* bone,
                         int32_t planes,
                         float* all_slopes,
                         const float* bone_slopes) {
-  const HardeningPolynomial of = polynomial;
+  const HardeningPolynomial polynomial = given;
   for (int64_t i = 0; i < count; i += kLanes) {
     const int64_t left = count - i;
     const WithSlopes found =
-        hardened_with_slopes(of, load_some(all + i, left), load_some(bone + i, left));
+        hardened_with_slopes(polynomial, load_some(all + i, left), load_some(bone + i, left));
     store_some(all + i, left, found.value);
     for (int32_t plane = 0; plane < planes; ++plane) {
       const int64_t at = plane * count + i;

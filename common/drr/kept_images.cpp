@@ -7,16 +7,16 @@
 namespace af {
 namespace {
 
-/// Most parallax, in nodes of a slab, that kept images follow to first order. With half a node,
-/// values were so much higher than those of new images that searches refused later steps, whose
-/// images were made anew (docs/look-up.md). \test
-/// KeptImages.ServeNoPoseThatShiftsASlabByMoreThanAnEighthOfANode
+/// Most parallax, in nodes of a slab, that kept images follow to first order. At half a node, their
+/// values exceeded those of new images by so much that searches refused later steps, which used new
+/// images (docs/look-up.md). \test KeptImages.ServeNoPoseThatShiftsASlabByMoreThanAnEighthOfANode
 constexpr double kMostParallaxNodes = 0.125;
 
 /// Share of a (u,v) cell by which viewpoints may move.
 constexpr double kMostViewpointShare = 0.25;
 
-/// How far the hits on a plane move per mm of the source, while those on the images' plane stay.
+/// How far the hits on a plane move per mm that the source moves, while those on the images' plane
+/// stay.
 double hits_per_mm(double plane_y_mm, double images_y_mm, double source_y_mm) {
   return std::abs((plane_y_mm - images_y_mm) / (source_y_mm - images_y_mm));
 }

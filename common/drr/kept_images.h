@@ -13,13 +13,13 @@
 namespace af {
 
 /// The node images of a look-up, with their slopes along the source, kept for DRRs whose source is
-/// near: the image of a node n for a source that moved by d is, to first order,
+/// near. For a source that moved by d, the image of a node n is, to first order,
 ///
 ///     value(n) + source_x(n) (d_x - m_x d_y) + source_z(n) (d_z - m_z d_y),
 ///
-/// (m_x, 1, m_z) being the ray's direction: a source that moves along a ray does not change it.
-/// What this leaves out is kept small: the second order of how slabs shift against the plane of
-/// their sum (nothing for one slab), and that viewpoints come to lie in other cells. \test
+/// where (m_x, 1, m_z) is the ray's direction: a source that moves along a ray does not change the
+/// ray. Two things are left out, and kept small: the second order of how slabs shift against the
+/// plane of their sum (nothing for one slab), and viewpoints that come to lie in other cells. \test
 /// KeptImages.AreNearTheLookUpWhileTheSourceIsNear
 class KeptImages {
  public:
@@ -28,11 +28,11 @@ class KeptImages {
   static constexpr int kMargin = 4;
 
   void forget() { is_kept_ = false; }
-  /// `images` must have slopes and hold all nodes within kMargin of those that the rays need.
-  /// `nodes_per_node`: nodes of `images` along an axis per node that kMargin counts.
+  /// `images` must have slopes, and hold all nodes within kMargin of those that the rays need.
+  /// `nodes_per_node`: how many nodes of `images` along an axis make one node of kMargin.
   void keep(const NodeImages& images, int nodes_per_node, const SlabRays& rays);
-  /// The motion of the source since the images were made, in the slab frame, mm; nullopt when the
-  /// images cannot serve these rays.
+  /// The motion of the source since the images were made (slab frame, mm). nullopt when the images
+  /// cannot serve these rays.
   [[nodiscard]] std::optional<Eigen::Vector3d> source_move(const ViewpointBlender& blender,
                                                            const SlabRays& rays) const;
   [[nodiscard]] const NodeImages& images() const { return images_; }

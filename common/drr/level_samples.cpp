@@ -17,7 +17,8 @@ namespace af {
 
 namespace {
 
-/// In place of the fork_generation(), and one, of the process that makes a tile.
+/// Stands for no process. Otherwise the fork_generation() of the process that makes a tile, plus
+/// one.
 constexpr std::uint32_t kNobody = 0;
 constexpr std::uint32_t kMade = std::numeric_limits<std::uint32_t>::max();
 constexpr std::chrono::microseconds kWait{50};
@@ -84,7 +85,7 @@ void LevelSamples::require_tile(int a, int b) const {
   std::uint32_t seen = kNobody;
   while (!maker.compare_exchange_strong(seen, self)) {
     if (seen == kMade) return;
-    // A process that was forked while its parent made the tile has a copy that nobody goes on with.
+    // A process that was forked while its parent made the tile has a copy that nobody continues.
     if (!memory_.is_of_processes && seen != self) continue;
     std::this_thread::sleep_for(kWait);
     seen = kNobody;

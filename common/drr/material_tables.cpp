@@ -71,7 +71,7 @@ double linear_attenuation_per_mm(Material material, double energy_kev) {
 }
 
 double effective_energy_kev(double mu_water_per_mm) {
-  double low = kLowestTableEnergyKev;  // water attenuates less and less up to 200 keV
+  double low = kLowestTableEnergyKev;  // water attenuates less as energy grows to 200 keV
   double high = kHighestTableEnergyKev;
   const double largest = linear_attenuation_per_mm(Material::Water, low);
   const double smallest = linear_attenuation_per_mm(Material::Water, high);

@@ -12,8 +12,8 @@ using native::kLanes;
 using native::load;
 using native::store;
 
-/// Lagrange's polynomial through six nodes, halfway between the middle two: weights of the nearest
-/// nodes on either side, then of the next ones.
+/// Lagrange's polynomial through six nodes, halfway between the middle two. Weights of the nearest
+/// nodes on either side come first, then those of the next ones.
 constexpr float kWeights[kUpsampleReach] = {150.0f / 256.0f, -25.0f / 256.0f, 3.0f / 256.0f};
 
 AF_KERNEL_INLINE Floats halfway(const float* const rows[2 * kUpsampleReach], int32_t at) {
@@ -28,7 +28,7 @@ AF_KERNEL_INLINE int32_t within(int32_t index, int32_t count) {
   return index < 0 ? 0 : (index < count ? index : count - 1);
 }
 
-/// One row, twice as fine.
+/// Makes one row twice as fine.
 AF_KERNEL_INLINE void upsample_row(const float* in, int32_t count, float* padded, float* out) {
   memcpy(padded + kUpsampleReach, in, sizeof(float) * static_cast<size_t>(count));
   for (int32_t i = 0; i < kUpsampleReach; ++i) {

@@ -14,7 +14,7 @@ struct NodeGrid {
   std::int32_t stride, s_count, t_count;
 };
 
-/// Images of the nodes of one grid: the value and, unless null, its slopes along the source's x and
+/// Images at the nodes of one grid: the value and, unless null, its slopes along the source's x and
 /// z (per mm).
 struct NodeImages {
   NodeGrid grid;

@@ -59,9 +59,9 @@ std::vector<FieldSetMember> OpenedField::renderers(const std::string& look_up,
                                                    const std::shared_ptr<ThreadPool>& pool) const {
   const std::string way = look_up.empty() ? info_.look_up : look_up;
   if (field_) return {{coverage_.planes.front(), make_field_renderer(field_, way, pool)}};
-  const auto open = [of = *this, way, pool](std::size_t member) {
+  const auto open = [opened = *this, way, pool](std::size_t member) {
     return std::make_shared<const MemberLevels>(
-        MemberLevels{make_field_renderer(of.member(member, Communicator::alone()), way, pool)});
+        MemberLevels{make_field_renderer(opened.member(member, Communicator::alone()), way, pool)});
   };
   return atlas_level(coverage_.planes, std::make_shared<MembersInUse>(open, kMembersKept), 0);
 }

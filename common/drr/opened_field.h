@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A file of a field or of an atlas, for programs that take either.
+// A file that holds a field or an atlas, for programs that take either.
 #pragma once
 
 #include <cstdint>
@@ -18,9 +18,9 @@
 
 namespace af {
 
-/// What is looked up in a field besides its codewords.
+/// What is looked up in a field instead of its codewords.
 struct FieldSamples {
-  std::shared_ptr<const FieldLevel> level_0;  ///< null: by codewords
+  std::shared_ptr<const FieldLevel> level_0;  ///< null: codewords are looked up
   FieldLevels pyramid;                        ///< levels 1, ...
 };
 
@@ -30,15 +30,15 @@ class OpenedField {
  public:
   enum class Materials { All, Any };
 
-  /// Collective. Throws as read_field() and read_atlas(); also refuses a field of bone alone unless
-  /// `materials` is Any.
+  /// Collective. Throws as read_field() and read_atlas() do. Also refuses a field of bone alone,
+  /// unless `materials` is Any.
   OpenedField(const std::filesystem::path& path,
               const Communicator& communicator,
               Materials materials = Materials::All);
 
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
   [[nodiscard]] const FieldFileInfo& info() const { return info_; }
-  /// Of an atlas: the camera and frame that its members were derived from.
+  /// For an atlas: the camera and frame from which its members were derived.
   [[nodiscard]] const FieldIdentity& identity() const {
     return atlas_ ? atlas_->identity : field_->identity;
   }
@@ -53,23 +53,23 @@ class OpenedField {
   [[nodiscard]] std::size_t codewords() const;
 
   /// Collective, for one thread at a time. The field or atlas of the CT's bone beside it, for DRRs
-  /// of a tube's spectrum; opened once. The two need not be cut alike. FileError where there is
-  /// none that belongs to it.
+  /// of a tube's spectrum. It is opened once, and need not be cut like this one. Throws FileError
+  /// where there is none that belongs to it.
   [[nodiscard]] OpenedField bone(const Communicator& communicator) const;
 
-  /// Of a field: the samples that its users have made so far, for one thread at a time.
+  /// For a field: the samples that its users have made so far, for one thread at a time.
   [[nodiscard]] FieldSamples& samples() const { return shared_->samples; }
 
-  /// Collective for a communicator of ranks. A member of an atlas.
+  /// Collective for a communicator of ranks. One member of an atlas.
   [[nodiscard]] std::shared_ptr<const CompressedAttenuationField> member(
       std::size_t member, const Communicator& communicator) const;
 
   /// The field, or every member, looked up by a name of field_look_up_names(), or the file's own
-  /// way where the name is empty. Of an atlas at most kMembersKept members are in memory, read by
+  /// way where the name is empty. At most kMembersKept members of an atlas are in memory, read by
   /// this process alone.
   [[nodiscard]] std::vector<FieldSetMember> renderers(
       const std::string& look_up, const std::shared_ptr<ThreadPool>& pool = nullptr) const;
-  /// One renderer of all of them.
+  /// One renderer that joins them all.
   [[nodiscard]] std::shared_ptr<const DrrRenderer> renderer(
       const std::string& look_up, const std::shared_ptr<ThreadPool>& pool = nullptr) const;
 

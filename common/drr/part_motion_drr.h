@@ -8,18 +8,19 @@
 
 namespace af {
 
-/// DRRs of a CT of which one part alone moves while the rest stays where it was held: the part's
-/// DRR at a pose, and of the rest the difference between whole and part at the held pose. At the
-/// held pose they are the DRRs of the whole. \test PartMotionDrr.MovesThePartAlone
+/// DRRs of a CT of which only one part moves, while the rest stays where it was held. They add the
+/// part's DRR at a pose and the difference between whole and part at the held pose. At the held
+/// pose they are the DRRs of the whole. \test PartMotionDrr.MovesThePartAlone
 class PartMotionDrr final : public DrrRenderer {
  public:
-  /// Both of the same CT, frame and blur.
+  /// Both must have the same CT, frame and blur.
   PartMotionDrr(std::shared_ptr<const DrrRenderer> whole, std::shared_ptr<const DrrRenderer> part);
 
-  /// Holds the rest at a pose, for DRRs of this view alone. Not while other threads render.
+  /// Holds the rest at a pose, for DRRs of this view alone. Other threads must not render
+  /// meanwhile.
   RenderStatus hold(const RigidTransform& room_from_ct, const View& view);
 
-  /// The rest's DRR, row-major over the view held.
+  /// The rest's DRR, row-major over the held view.
   [[nodiscard]] const std::vector<float>& rest() const { return rest_; }
 
   RenderStatus render(const RigidTransform& room_from_ct,

@@ -25,7 +25,7 @@ PolychromaticAttenuation::PolychromaticAttenuation(const SpectrumOptions& option
 }
 
 PolychromaticAttenuation::Sum PolychromaticAttenuation::summed(double water, double bone) const {
-  // The bin that comes through best is taken out, so that no ray is too long for the sum.
+  // The bin that comes through best is factored out, so that no ray is too long for the sum.
   double least = std::numeric_limits<double>::infinity();
   for (const HardeningBin& bin : bins_)
     least = std::min(least, water * bin.water + bone * bin.bone);
@@ -73,7 +73,7 @@ void PolychromaticAttenuation::apply(std::span<float> all,
 PolychromaticAttenuation::Value PolychromaticAttenuation::at(double all, double bone) const {
   auto u = static_cast<float>(all);
   const auto of_bone = static_cast<float>(bone);
-  // Where all grows and bone stays, and the other way round.
+  // The slope where all grows and bone stays, then where bone grows and all stays.
   std::array<float, 2> slopes{1.0f, 0.0f};
   const std::array<float, 2> bone_slopes{0.0f, 1.0f};
   apply({&u, 1}, {&of_bone, 1}, slopes, bone_slopes);

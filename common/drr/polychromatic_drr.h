@@ -9,8 +9,8 @@
 namespace af {
 
 /// DRRs of polychromatic X-rays. One renderer gives the ordinary DRR, another the bone's part of
-/// it; PolychromaticAttenuation turns the two, pixel by pixel, into the attenuation of the whole
-/// spectrum. The renderers may look fields up or cast rays. Derivatives follow by the chain rule.
+/// it. PolychromaticAttenuation turns the two, pixel by pixel, into the attenuation of the whole
+/// spectrum. The renderers may look up fields or cast rays. Derivatives follow by the chain rule.
 /// \test PolychromaticDrr.OfASlabIsTheSumOverTheSpectrum
 class PolychromaticDrr final : public DrrRenderer {
  public:
@@ -19,7 +19,7 @@ class PolychromaticDrr final : public DrrRenderer {
                    std::shared_ptr<const PolychromaticAttenuation> attenuation);
 
   /// Reports the larger rays_outside of the two renderers. Where the ordinary DRR is 0, so is this
-  /// one; where only the bone's ray is outside, the whole ray counts as water.
+  /// one. Where only the bone's ray is outside, the whole ray counts as water.
   RenderStatus render(const RigidTransform& room_from_ct,
                       const View& view,
                       RenderWorkspace& workspace,
@@ -28,7 +28,7 @@ class PolychromaticDrr final : public DrrRenderer {
   [[nodiscard]] std::int64_t rays_outside(const RigidTransform& room_from_ct,
                                           const View& view) const override;
   [[nodiscard]] std::unique_ptr<RenderWorkspace> make_workspace() const override;
-  /// That of the ordinary DRR's renderer.
+  /// The name of the ordinary DRR's renderer.
   [[nodiscard]] const char* name() const override { return all_->name(); }
 
  private:

@@ -33,7 +33,7 @@ struct FieldSample {
   std::array<double, 4> slope = {0.0, 0.0, 0.0, 0.0};
 };
 
-/// Values at nodes, by definition or from what has been decoded.
+/// Values at nodes, by definition or from what has been decoded already.
 struct NodeValues {
   const CompressedAttenuationField& field;
   const FieldLevel* decoded;
@@ -81,8 +81,9 @@ FieldSample quadrilinear_sample(const NodeValues& values, std::size_t k, const R
   return sample;
 }
 
-/// Derivatives of a ray (slab frame) with respect to the six pose parameters of PoseGradients. A CT
-/// moved by t + R about p sees a room point x at x - t - omega x (x - p), to first order.
+/// Derivatives of a ray (slab frame) with respect to the six pose parameters of PoseGradients. When
+/// the CT moves by t + R about p, it sees a room point x at x - t - omega x (x - p), to first
+/// order.
 std::array<Ray, 6> ray_derivatives(const Eigen::Matrix3d& slab_from_room_axes,
                                    const Eigen::Vector3d& source_from_pivot,
                                    const Eigen::Vector3d& direction_in_room) {

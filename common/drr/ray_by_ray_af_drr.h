@@ -12,9 +12,10 @@ namespace af {
 
 enum class FieldInterpolation { Nearest, Quadrilinear };
 
-/// DRRs by look-up in a compressed field (Sec. II-B): each ray's (u,v,s,t) per slab, nearest node
-/// or quadrilinear over 16 neighbours, decoded straight from the codebook, or once for all where it
-/// has a filter; slabs' contributions add. \test RayByRayAfDrr.ReproducesMultilinearFieldExactly
+/// DRRs by look-up in a compressed field (Sec. II-B). Each ray's (u,v,s,t) is found per slab, and
+/// takes the nearest node or interpolates over 16 neighbours. Nodes are decoded straight from the
+/// codebook, or once for all where it has a filter. The slabs' contributions add. \test
+/// RayByRayAfDrr.ReproducesMultilinearFieldExactly
 class RayByRayAfDrr final : public DrrRenderer {
  public:
   explicit RayByRayAfDrr(std::shared_ptr<const CompressedAttenuationField> field,

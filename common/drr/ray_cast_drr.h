@@ -8,7 +8,7 @@
 
 namespace af {
 
-/// DRRs by the reference ray caster, with its derivatives (RayCaster::cast_with_slopes); no ray is
+/// DRRs by the reference ray caster, with its derivatives (RayCaster::cast_with_slopes). No ray is
 /// ever outside. \test RayCastDrr.GradientsAgreeWithCentralDifferences
 class RayCastDrr final : public DrrRenderer {
  public:

@@ -7,13 +7,13 @@
 
 namespace af {
 
-/// DRRs with even scatter. With P = exp(-U), the primary share of the open beam in another
-/// renderer's DRR, and s = scatter_to_primary * mean P over the view,
+/// DRRs with even scatter. P = exp(-U) is the primary share of the open beam in another renderer's
+/// DRR, and s = scatter_to_primary * mean P over the view. Then
 ///
 ///     U' = -ln(P + s).
 ///
 /// Scatter spreads over some hundred millimetres on a detector, so within a region of interest most
-/// of it is its mean; U' is wrong where scatter is uneven, or where the ratio differs. Derivatives
+/// of it is its mean. U' is wrong where scatter is uneven, or where the ratio differs. Derivatives
 /// include that of s. \test ScatteredDrr.AddsTheMeanPrimarySignalTimesTheRatio
 class ScatteredDrr final : public DrrRenderer {
  public:

@@ -11,7 +11,7 @@ namespace af {
 
 namespace {
 
-/// Nodes around a slab's stored ones that taps may reach; taps further out reach nothing else.
+/// Nodes around a slab's stored ones that taps may reach. Taps further out reach only zeros.
 constexpr int kBorder = MergingTaps::kCount;
 
 /// (1 3 3 1)/8 centred at a node coordinate.
@@ -33,8 +33,8 @@ MergingTaps halving_taps(double coordinate) {
   return taps;
 }
 
-/// Where lines from a viewpoint through a node of the merged plane meet a slab's plane, in the
-/// slab's node coordinates; along one axis.
+/// Where lines from a viewpoint through a node of the merged plane meet a slab's plane, along one
+/// axis, in the slab's node coordinates.
 class NodeMap {
  public:
   NodeMap(const GridAxis& merged, const GridAxis& slab, double reach_ratio)
@@ -51,7 +51,7 @@ class NodeMap {
   double reach_ratio_;
 };
 
-/// Distance of the slab's plane from the viewpoints over that of the merged plane.
+/// The distance of the slab's plane from the viewpoints, divided by that of the merged plane.
 double reach_ratio(const LightSlab& field_geometry,
                    const SlabGeometry& slab,
                    const SlabGeometry& merged) {
@@ -59,8 +59,8 @@ double reach_ratio(const LightSlab& field_geometry,
          (field_geometry.uv_plane_y_mm - merged.st_plane_y_mm);
 }
 
-/// The halved axis of a plane at a weighted mean depth: a ray's positions on the planes are an
-/// affine function of depth, so the edges are, too.
+/// The halved axis of a plane at a weighted mean depth. A ray's positions on the planes are an
+/// affine function of depth, so the edges are too.
 GridAxis mean_halved_axis(std::span<const FieldLevelSlab> slabs,
                           std::span<const double> weights,
                           GridAxis SlabGeometry::*axis,
@@ -112,8 +112,8 @@ std::vector<std::vector<MergingTaps>> taps_of(const NodeMap& map,
   return taps;
 }
 
-/// One viewpoint's samples of a slab with a border: the outermost nodes of the lattice are
-/// replicated, nodes that are not stored are 0.
+/// One viewpoint's samples of a slab with a border. The outermost nodes of the lattice are
+/// replicated; nodes that are not stored are 0.
 class BorderedImage {
  public:
   explicit BorderedImage(const SlabGeometry& slab)
@@ -123,11 +123,11 @@ class BorderedImage {
         values_(static_cast<std::size_t>(stride_) * static_cast<std::size_t>(rows_)) {}
 
   [[nodiscard]] int stride() const { return stride_; }
-  /// First of the rows that taps weight.
+  /// The first row that taps weight.
   [[nodiscard]] const float* rows(const MergingTaps& taps) const {
     return row(offset(taps.first, slab_.stored_t));
   }
-  /// Where taps begin within a row.
+  /// The column where taps begin within a row.
   [[nodiscard]] int column(const MergingTaps& taps) const {
     return offset(taps.first, slab_.stored_s);
   }

@@ -51,9 +51,9 @@ bool SlabRays::all_inside() const {
 std::array<double, 4> SlabRays::shares_to_edges() const {
   if (!all_cross()) return {-1.0, -1.0, -1.0, -1.0};
   std::array<double, 4> least = {0.5, 0.5, 0.5, 0.5};
-  const auto keep = [&](std::size_t of, const GridAxis& axis, double position_mm) {
+  const auto keep = [&](std::size_t i, const GridAxis& axis, double position_mm) {
     const double distance_mm = std::min(position_mm - axis.first_mm, axis.last_mm - position_mm);
-    least[of] = std::min(least[of], distance_mm / (axis.last_mm - axis.first_mm));
+    least[i] = std::min(least[i], distance_mm / (axis.last_mm - axis.first_mm));
   };
   for (const Eigen::Vector3d& direction : corner_directions()) {
     const Eigen::Vector3d on_uv = hit(light_slab_.uv_plane_y_mm, direction);
@@ -93,9 +93,9 @@ std::int64_t SlabRays::blank_outside(std::span<float> planes, std::span<float> m
 
 namespace {
 
-/// Nodes around coordinates low ... high, within the lattice; at least two.
+/// Nodes around coordinates low ... high, within the lattice. At least two.
 NodeRange nodes_around(double low, double high, int nodes, const Footprint::Needs& needs) {
-  // Clamped before rounding: rays that miss the plane can be anywhere.
+  // Clamped before rounding, because rays that miss the plane can be anywhere.
   const int lower = static_cast<int>(std::floor(std::clamp(low, 0.0, nodes - 2.0)));
   const int upper = static_cast<int>(std::ceil(std::clamp(high, lower + 1.0, nodes - 1.0)));
   int begin = std::max(0, lower - needs.margin);

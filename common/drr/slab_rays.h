@@ -8,9 +8,9 @@
 
 namespace af {
 
-/// The rays of a view's region of interest in the slab frame (mm): from `source` along first +
-/// column * column_step + row * row_step, column and row counted from the region's corner. The
-/// light slab must outlive them.
+/// The rays of a view's region of interest in the slab frame (mm). They run from `source` along
+/// first + column * column_step + row * row_step, where column and row count from the region's
+/// corner. The light slab must outlive them.
 struct SlabRays {
   RigidTransform slab_from_room;
   Eigen::Vector3d source;
@@ -22,27 +22,27 @@ struct SlabRays {
   SlabRays(const LightSlab& light_slab, const RigidTransform& room_from_ct, const View& view);
 
   [[nodiscard]] std::array<Eigen::Vector3d, 4> corner_directions() const;
-  /// Where a ray of a direction meets the plane y = plane_y_mm.
+  /// Where a ray with this direction meets the plane y = plane_y_mm.
   [[nodiscard]] Eigen::Vector3d hit(double plane_y_mm, const Eigen::Vector3d& direction) const {
     return source + (plane_y_mm - source.y()) / direction.y() * direction;
   }
-  /// Whether all rays cross all planes, inside or outside their rectangles: the source is before
-  /// all attenuation (LightSlab::lies_before()), none of them is parallel to the planes or rises
-  /// from them, and no number is NaN or infinite.
+  /// Whether all rays cross all planes, inside or outside their rectangles. The source must be in
+  /// front of all attenuation (LightSlab::lies_before()), no ray may be parallel to the planes or
+  /// rise from them, and no number may be NaN or infinite.
   [[nodiscard]] bool all_cross() const;
   /// Whether all rays meet every plane within its rectangle. Their hits form a convex quadrilateral
   /// on each plane, so the corner rays decide.
   [[nodiscard]] bool all_inside() const;
   /// How far the rays keep from the edges of the planes: the least distance of a hit from an edge,
-  /// as a share of the plane's side, at most 0.5. Below 0 when a ray is outside.
+  /// as a share of the plane's side, at most 0.5. It is below 0 when a ray is outside.
   [[nodiscard]] double share_to_edges() const;
-  /// The same for each of the axes u, v, s and t, the least over the slabs; all -1 when a ray does
-  /// not cross.
+  /// The same for each of the axes u, v, s and t, the least over the slabs. All are -1 when a ray
+  /// does not cross.
   [[nodiscard]] std::array<double, 4> shares_to_edges() const;
-  /// Rays that miss a plane.
+  /// How many rays miss a plane.
   [[nodiscard]] std::int64_t count_outside() const;
-  /// Counts the rays that miss a plane and zeroes their pixels in both outputs. Each output has any
-  /// number of planes of the region's pixels.
+  /// Counts the rays that miss a plane, and zeroes their pixels in both outputs. Each output has
+  /// any number of planes of the region's pixels.
   [[nodiscard]] std::int64_t blank_outside(std::span<float> planes,
                                            std::span<float> more_planes = {}) const;
 
@@ -62,13 +62,13 @@ class Footprint {
                                ///< number of nodes it holds one more than the lattice
   };
 
-  /// For rays that cross.
+  /// Only for rays that cross.
   Footprint(const SlabGeometry& slab, const SlabRays& rays, const Needs& needs);
 
   /// The box, at least 2 x 2 nodes.
   [[nodiscard]] const NodeRange& s() const { return s_; }
   [[nodiscard]] const NodeRange& t() const { return t_; }
-  /// The nodes along t that are needed among nodes s, and the other way round; may be empty.
+  /// The nodes along t that are needed among nodes s, and likewise for s. May be empty.
   [[nodiscard]] NodeRange t_needed(const NodeRange& s) const;
   [[nodiscard]] NodeRange s_needed(const NodeRange& t) const;
 
@@ -76,7 +76,7 @@ class Footprint {
   /// Where the rays of the region's corners meet the plane, in node coordinates (s, t), in order
   /// around the quadrilateral.
   std::array<std::array<double, 2>, 4> corners_{};
-  /// For the side from corner i to the next: change of the other coordinate with coordinate 0 or 1.
+  /// For the side from corner i to the next: change of the other coordinate per coordinate 0 or 1.
   std::array<std::array<double, 2>, 4> side_slopes_{};
   NodeRange s_;
   NodeRange t_;

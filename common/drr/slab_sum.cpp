@@ -13,9 +13,9 @@ namespace {
 /// Entries that kernels load beyond the last column.
 constexpr std::size_t kBeyond = 48;
 
-/// Linear between, or beyond, the two nodes around a coordinate.
+/// Linear taps between the two nodes around a coordinate, or beyond them.
 void place_linear_taps(double coordinate, int nodes, std::size_t i, const SumTaps& taps) {
-  // In this order NaN becomes -1.
+  // This order turns NaN into -1.
   const double limited = std::min(std::max(-1.0, coordinate), static_cast<double>(nodes));
   const int lower = std::clamp(static_cast<int>(std::floor(limited)), 0, nodes - 2);
   taps.first[i] = std::clamp(lower, 0, std::max(0, nodes - kSumTaps));
@@ -36,8 +36,8 @@ struct NodesInSlab {
   int slab_nodes;
 };
 
-/// Beyond the image it goes on linearly for a node: the outermost cells of a sum have corners
-/// there.
+/// Taps continue linearly for one node beyond the image, because the outermost cells of a sum have
+/// corners there.
 void place_all_taps(const NodesInSlab& nodes, const SumTaps& taps) {
   const auto place_linear = [&](int i) {
     place_linear_taps(

@@ -13,21 +13,21 @@ namespace af {
 
 /// Scratch memory of a sum.
 struct SlabSumScratch {
-  /// Of the sum's columns and rows.
+  /// For the sum's columns and rows.
   std::array<std::vector<std::int32_t>, 2> first;
   std::array<std::vector<float>, 2> weights;
   std::array<std::vector<float>, 3> row_images;
 };
 
-/// Sums images of several slabs on one plane. From one source the nodes of the sum are scaled and
-/// shifted against those of each slab, along s and t separately, so a slab is resampled by two
-/// passes of four taps (Lagrange's cubic): far cheaper than resampling each slab to the detector.
-/// Parallax between slabs is kept, because the sum is made for this source alone.
+/// Sums images of several slabs on one plane. From one source, the nodes of the sum are scaled and
+/// shifted against those of each slab, along s and t separately. A slab is therefore resampled by
+/// two passes of four taps (Lagrange's cubic), far cheaper than resampling each slab to the
+/// detector. Parallax between slabs is kept, because the sum is made for this source alone.
 /// \test SlabSum.OfOneSlabInItsOwnPlaneIsTheSlab
 class SlabSum {
  public:
-  /// Sums into `images` (slopes that are null are not wanted) of grid.t_count rows, each writable
-  /// for 16 values beyond its end. `source` is in the slab frame.
+  /// Sums into `images` of grid.t_count rows, each writable for 16 values beyond its end. Null
+  /// slopes are not wanted. `source` is in the slab frame.
   SlabSum(const NodeGrid& grid,
           const Eigen::Vector3d& source,
           const std::array<float*, 3>& images,

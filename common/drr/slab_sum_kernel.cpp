@@ -65,7 +65,7 @@ struct Window {
 };
 
 AF_KERNEL_INLINE Window window_of(const int32_t* first) {
-  // Ascending, so that the last one is furthest.
+  // The first taps ascend, so the last one is furthest.
   const int32_t span = first[kLanes - 1] - first[0];
   const Ints lane = load_ints(first) - first[0];
   return {first[0],
@@ -77,7 +77,7 @@ AF_KERNEL_INLINE Window window_of(const int32_t* first) {
 
 AF_KERNEL_INLINE void take(const Window& window, const float* row, Floats (&values)[kSumTaps]) {
   const float* const from = row + window.base;
-  // Nodes of a slab and of the sum are about as far apart.
+  // Nodes of a slab and of the sum are usually about as far apart.
   if (window.is_even) {
     for (int tap = 0; tap < kSumTaps; ++tap) values[tap] = load(from + tap);
     return;
@@ -106,7 +106,7 @@ AF_KERNEL_INLINE void put(const SlabTerm& term, int image, int64_t at, Floats va
 
 template <bool kWithSlopes>
 AF_KERNEL_INLINE void add(const SlabTerm& given) {
-  // A copy that no store can change.
+  // A copy, so that the compiler knows that no store changes it.
   const SlabTerm term = given;
   for (int32_t r = 0; r < term.sum_rows; ++r) {
     make_rows<kWithSlopes>(term, r);

@@ -23,8 +23,8 @@ struct Block {
   int32_t first_s;
 };
 
-/// Where the neighbours of a block have their coefficient 0: so many steps along an axis (0 ... 3:
-/// u, v, s, t), and along another.
+/// Where the neighbours of a block have their coefficient 0: this many steps along one axis (0 ...
+/// 3: u, v, s, t), and along another.
 AF_KERNEL_INLINE const float* neighbour(
     const Block& block, int a, int a_side, int b = 0, int b_side = 0) {
   int offset[4] = {};
@@ -116,7 +116,7 @@ void filter_tile_row(const FilterRow& row, Weights weights, uint16_t* const rows
       for (int b = a + 1; b < 4; ++b, input += 4) add_pair(block, a, b, input, weights, estimates);
     to_levels(estimates);
     for (int i = 0; i < 8; ++i) {
-      // Elements of lower and upper nodes along s: 8 du + 4 dv + 2 ds + dt.
+      // Elements at the lower and upper nodes along s are numbered 8 du + 4 dv + 2 ds + dt.
       const int lower = 4 * (i / 2) + i % 2;
       const Ints levels =
           native::to_int(estimates[lower]) | (native::to_int(estimates[lower + 2]) << 16);

@@ -16,7 +16,7 @@ namespace af {
 
 namespace {
 
-/// Kernels read rows, and read and write whole vectors, up to two, beyond an image.
+/// Kernels read rows beyond an image, and read and write up to two whole vectors beyond it.
 constexpr int kRowsBeyond = 4;
 constexpr std::size_t kImagePadding = 64;
 
@@ -24,8 +24,8 @@ std::ptrdiff_t rounded_up(std::ptrdiff_t count, std::ptrdiff_t multiple) {
   return (count + multiple - 1) / multiple * multiple;
 }
 
-/// Extra nodes of a slab, around those that the rays hit, for its sum with others: a node of the
-/// sum lies up to one of its own nodes outside and needs two more on that side.
+/// Extra nodes of a slab around those that the rays hit, for its sum with others. A node of the sum
+/// lies up to one of its own nodes outside, and needs two more on that side.
 constexpr int kSumMargin = 3;
 
 /// A node image's memory, grown when a larger one is needed and never shrunk.
@@ -86,8 +86,8 @@ NodeGrid twice_as_fine(const NodeGrid& grid, std::ptrdiff_t stride) {
   return fine;
 }
 
-/// node = (source + reach * d_x / d_y - first) / spacing, multiplied through by d_y: affine in the
-/// pixel.
+/// node = (source + reach * d_x / d_y - first) / spacing, multiplied through by d_y. This is affine
+/// in the pixel.
 Homography nodes_from_pixels(const NodeGrid& grid, const SlabRays& rays) {
   const double reach = grid.plane_y_mm - rays.source.y();
   const double s_offset = rays.source.x() - grid.s_first_mm;
@@ -105,7 +105,7 @@ Homography nodes_from_pixels(const NodeGrid& grid, const SlabRays& rays) {
 }
 
 /// The values of a slab's images that the gradients of a pose need (PoseSlopes has the mechanics).
-/// `source_move`: since the images were made.
+/// `source_move`: the source's motion since the images were made.
 PoseSlopes pose_slopes(const NodeImages& slab,
                        const SlabRays& rays,
                        const Eigen::Vector3d& source_move,
@@ -123,7 +123,7 @@ PoseSlopes pose_slopes(const NodeImages& slab,
   slopes.m_offset[0] = static_cast<float>((grid.s_first_mm - rays.source.x()) / reach);
   slopes.m_offset[1] = static_cast<float>((grid.t_first_mm - rays.source.z()) / reach);
   for (int i = 0; i < 3; ++i) slopes.source_move[i] = static_cast<float>(source_move[i]);
-  // A CT moved by t + omega x (x - p) meets rays moved the other way.
+  // When the CT moves by t + omega x (x - p), it meets rays that move the other way.
   for (int axis = 0; axis < 3; ++axis) {
     const Eigen::Vector3d direction = slab_from_room.col(axis);
     const Eigen::Vector3d arm = direction.cross(slab_from_room * source_from_pivot);
@@ -136,7 +136,7 @@ PoseSlopes pose_slopes(const NodeImages& slab,
   return slopes;
 }
 
-/// The results of the first pass that the second pass needs.
+/// What the second pass needs of the first.
 struct BlendNeeds {
   int margin;  ///< nodes around those that the rays hit
   bool slopes;
@@ -162,7 +162,8 @@ NodeImages blended_images(const ViewpointBlender& blender,
           {images.value, images.source_x, images.source_z}};
 }
 
-/// First pass of all slabs: the images of the only one, or their sum on the plane of `sum_slab`.
+/// First pass of all slabs: the images of the only one, or the sum of all on the plane of
+/// `sum_slab`.
 NodeImages summed_images(const ViewpointBlender& blender,
                          const SlabGeometry& sum_slab,
                          const SlabRays& rays,
@@ -207,13 +208,13 @@ NodeImages upsampled(const NodeImages& slab, Workspace& workspace) {
   return fine;
 }
 
-/// The node images of a DRR, and how far its source is from the one that they were made for.
+/// The node images of a DRR, and how far its source is from the one for which they were made.
 struct LookedUpNodes {
   NodeImages images;
   Eigen::Vector3d source_move;
 };
 
-/// Both passes before the warp, or the images that an earlier DRR left.
+/// Runs what precedes the warp, or takes the images that an earlier DRR left.
 LookedUpNodes looked_up_nodes(const ViewpointBlender& blender,
                               const SlabGeometry& sum_slab,
                               AxisInterpolation st,
@@ -231,8 +232,7 @@ LookedUpNodes looked_up_nodes(const ViewpointBlender& blender,
   return {nodes, Eigen::Vector3d::Zero()};
 }
 
-/// Sobel's slopes of the value image along s and t, stored where the slopes along the source would
-/// be.
+/// Sobel's slopes of the value image along s and t. They replace the slopes along the source.
 NodeImages with_sobel_slopes(const NodeImages& slab, Workspace& workspace) {
   const auto sobel_slopes = select_kernel<SobelSlopes>(
       kernels_128::sobel_slopes, kernels_256::sobel_slopes, kernels_512::sobel_slopes);
@@ -247,7 +247,7 @@ NodeImages with_sobel_slopes(const NodeImages& slab, Workspace& workspace) {
 /// first pass does not pay: it takes the same time for any detector.
 template <typename Work>
 void for_each_band(const View& view, ThreadPool& pool, const Work& work) {
-  // Smaller bands gain little, or lose: another processor first has to fetch the node image.
+  // Smaller bands gain little or lose, because another processor first has to fetch the node image.
   constexpr int kPixelsPerBand = 65536;
   const int rows = std::max(1, kPixelsPerBand / view.roi.width);
   pool.for_each_block(view.roi.height, rows, [&](int begin, int end) {
@@ -255,13 +255,13 @@ void for_each_band(const View& view, ThreadPool& pool, const Work& work) {
   });
 }
 
-/// Nodes of a finer sum per node of a slab. Two interpolations in turn lose more than one: with as
-/// many nodes cubic look-up lost up to 1.2 dB in the worst DRRs, with a quarter more nothing, and
-/// linear look-up gains 0.5 dB.
+/// Nodes of a finer sum per node of a slab. Two interpolations in turn lose more than one. With
+/// equally many nodes, cubic look-up lost up to 1.2 dB in the worst DRRs. With a quarter more it
+/// lost nothing, and linear look-up gains 0.5 dB.
 constexpr double kMoreNodesPerNode = 1.25;
 
-/// The lattice of a sum of slabs: midway between the outermost planes. A ray's place on a plane is
-/// an affine function of the plane's depth, so the edges are those between the slabs', too.
+/// The lattice of a sum of slabs, midway between the outermost planes. A ray's place on a plane is
+/// an affine function of the plane's depth, so the edges lie between the slabs' edges too.
 SlabGeometry sum_geometry(const ViewpointBlender& blender, const TwoPassOptions& options) {
   const bool has_more = options.sums_on_more_nodes || options.st == AxisInterpolation::Cubic;
   SlabGeometry sum = blender.slab(0);

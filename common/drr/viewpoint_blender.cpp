@@ -12,7 +12,7 @@ namespace af {
 
 namespace {
 
-/// Cubic weights or their slopes, of nodes -1, 0, 1, 2 around a position between nodes 0 and 1.
+/// Cubic weights, or their slopes, of nodes -1, 0, 1, 2 for a position between nodes 0 and 1.
 using CubicTaps = std::array<double, 4>;
 
 CubicTaps cubic_weights(double x) {
@@ -30,15 +30,15 @@ CubicTaps cubic_slopes(double x) {
 }
 
 /// Moves the taps inside: the weight of a node beyond the first or last one goes to the nodes that
-/// it continues linearly. There are at least four nodes.
+/// it continues linearly. Needs at least four nodes.
 CubicTaps folded(const CubicTaps& taps, int lower, int nodes) {
   if (lower == 0) return {taps[1] + 2.0 * taps[0], taps[2] - taps[0], taps[3], 0.0};
   if (lower == nodes - 2) return {0.0, taps[0], taps[1] - taps[3], taps[2] + 2.0 * taps[3]};
   return taps;
 }
 
-/// How the viewpoint coordinate on one axis follows from the node: the ray from the source through
-/// node position p meets the (u,v) plane at source + ratio * (p - source), on each axis by itself.
+/// How the viewpoint coordinate on one axis follows from the node. The ray from the source through
+/// node position p meets the (u,v) plane at source + ratio * (p - source), on each axis separately.
 class ViewpointLine {
  public:
   ViewpointLine(const GridAxis& nodes,
@@ -53,8 +53,8 @@ class ViewpointLine {
         interpolation_(interpolation) {}
 
   [[nodiscard]] ViewpointTap tap(int node) const {
-    // Nodes just outside the outermost rays can ask for a viewpoint just outside the rectangle. In
-    // this order NaN becomes 0: the difference of two sums beyond a double's range is no number.
+    // Nodes just outside the outermost rays can ask for a viewpoint just outside the rectangle.
+    // This order turns NaN into 0: the difference of two sums beyond a double's range is no number.
     const double coordinate =
         std::min(std::max(0.0, at_node_0_ + node * per_node_), viewpoints_ - 1.0);
     const int lower = std::min(static_cast<int>(coordinate), viewpoints_ - 2);
@@ -116,7 +116,7 @@ void clear_unstored(const Footprint& footprint,
   }
 }
 
-/// What both kinds of field share: taps of the stored nodes, zeroes elsewhere.
+/// What both kinds of field share: taps for the stored nodes, zeroes elsewhere.
 class AnyBlender : public ViewpointBlender {
  public:
   explicit AnyBlender(AxisInterpolation uv) : uv_(uv) {}
@@ -172,11 +172,11 @@ BlendedImages at_node(const BlendedImages& images, const Footprint& footprint, i
   return {images.value + offset, images.source_x + offset, images.source_z + offset, images.stride};
 }
 
-/// A codeword on a boundary of half a cache line.
+/// A codeword aligned to half a cache line.
 struct alignas(32) AlignedTile {
   Tile elements;
 };
-/// The same of a shape: differences from the mean.
+/// The same for a shape, the differences from the mean.
 struct alignas(32) AlignedShape {
   std::array<std::int16_t, kTileElements> differences;
 };
@@ -224,9 +224,9 @@ class CompressedBlender final : public AnyBlender {
 
   /// One of the axis pairs u, s and v, t of a tile.
   struct TileAxis {
-    std::int64_t tile_stride;  ///< of the viewpoints' tiles in the index array
-    unsigned node_bit;         ///< of an element's number; the viewpoint's bit is two higher
-    float scale;               ///< of all weights
+    std::int64_t tile_stride;  ///< between the viewpoints' tiles in the index array
+    unsigned node_bit;         ///< bit of an element's number; the viewpoint's bit is two higher
+    float scale;               ///< factor of all weights
   };
 
   /// Regroups the taps of node pairs by the pairs of viewpoints that share a tile.
@@ -273,7 +273,7 @@ class CompressedBlender final : public AnyBlender {
     }
   }
 
-  /// Values [viewpoint][node] to the elements of a codeword.
+  /// Spreads values [viewpoint][node] over the elements of a codeword.
   template <unsigned kNodeBit>
   static void spread(const float (&values)[4], float (&elements)[kTileElements]) {
     for (unsigned element = 0; element < kTileElements; ++element)
@@ -362,8 +362,8 @@ class LevelBlender final : public AnyBlender {
     const auto viewpoint_of = [](const std::vector<ViewpointTap>& taps, int node) {
       return taps[static_cast<std::size_t>(node)].first;
     };
-    // Blocks of nodes that lie between the same viewpoints. Those of a row go from left to right:
-    // each writes beyond its right edge.
+    // Blocks of nodes that lie between the same viewpoints. Those of a row go from left to right,
+    // because each writes beyond its right edge.
     const NodeRange &s = stored.s, &t = stored.t;
     for (int t_begin = t.begin, t_end = t_begin; t_begin < t.end(); t_begin = t_end) {
       const int v = viewpoint_of(scratch.v_taps, t_begin - t.begin);
@@ -382,7 +382,7 @@ class LevelBlender final : public AnyBlender {
     }
   }
 
-  /// Numbers of weights of one tap: one per node, readable for a vector beyond their end.
+  /// How many weights one tap has: one per node, readable for a vector beyond their end.
   static std::size_t weight_count(const BlendScratch& scratch) {
     return scratch.u_taps.size() + kFieldLevelPadding;
   }

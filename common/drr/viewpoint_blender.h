@@ -11,7 +11,7 @@
 namespace af {
 
 /// Interpolation along the field's axes: linear between two nodes, or cubic. In (u,v), cubic is
-/// Catmull-Rom through four nodes, and the field continues linearly beyond its first and last node.
+/// Catmull-Rom through four nodes. The field continues linearly beyond its first and last node.
 enum class AxisInterpolation { Linear, Cubic };
 
 /// Scratch memory of the first pass; one per thread.
@@ -23,20 +23,20 @@ struct BlendScratch {
   std::vector<float> u_weights;
 };
 
-/// Images of the nodes of a footprint, [t][s]. `stride` values from row to row are at least 15 more
-/// than there are nodes; the extra values are written, too.
+/// Images of the nodes of a footprint, [t][s]. Rows are `stride` values apart, at least 15 more
+/// than there are nodes. The extra values are written, too.
 struct BlendedImages {
   float* value = nullptr;
   /// Derivatives with respect to the source's x and z, per mm, as the source moves parallel to the
-  /// planes and the nodes stay; null when not wanted.
+  /// planes and the nodes stay. Null when not wanted.
   float* source_x = nullptr;
   float* source_z = nullptr;
   std::ptrdiff_t stride = 0;
 };
 
 /// First pass of a look-up. All rays of a DRR meet in the source, so the viewpoint (u, v) of a ray
-/// is an affine function of its (s, t): u depends on s alone, v on t alone. For every (s,t) node
-/// this blends the viewpoints around it.
+/// is an affine function of its (s, t): u depends on s alone, v on t alone. This blends the
+/// viewpoints around every (s,t) node.
 class ViewpointBlender {
  public:
   virtual ~ViewpointBlender() = default;
@@ -51,7 +51,7 @@ class ViewpointBlender {
                                             const SlabRays& rays,
                                             int margin) const = 0;
   /// Total attenuation of the rays from rays.source through the needed nodes of `footprint`. Nodes
-  /// that are not stored are 0; nodes that are not needed are unspecified.
+  /// that are not stored are 0. Nodes that are not needed are unspecified.
   virtual void blend(std::size_t k,
                      const SlabRays& rays,
                      const Footprint& footprint,
@@ -59,10 +59,10 @@ class ViewpointBlender {
                      const BlendedImages& images) const = 0;
 };
 
-/// From the codebook's tiles, or, where it has a filter, from samples.
+/// Blends the codebook's tiles or, where it has a filter, samples.
 std::unique_ptr<const ViewpointBlender> make_viewpoint_blender(
     std::shared_ptr<const CompressedAttenuationField> field, AxisInterpolation uv);
-/// From decoded samples.
+/// Blends decoded samples.
 std::unique_ptr<const ViewpointBlender> make_viewpoint_blender(
     std::shared_ptr<const FieldLevel> level, AxisInterpolation uv);
 

@@ -31,13 +31,13 @@ WarpRow row_of(const Homography& h, int32_t row) {
           static_cast<float>(h.d[1])};
 }
 
-/// The lanes of a row in which the coordinates are least: along a row of pixels they grow or fall,
-/// except for rounding.
+/// The lanes of a row where the coordinates are least. Along a row of pixels coordinates grow or
+/// fall, except for rounding.
 struct LeastLanes {
   Ints s, t;
 };
 
-/// What a window holds. A pick from two registers tells 2 kLanes nodes apart: kLanes of two rows,
+/// What a window holds. Picking from two registers tells 2 kLanes nodes apart: kLanes of two rows,
 /// or twice as many of one.
 enum class WindowShape : int32_t {
   NoWindow,  ///< registers cannot hold the cells: their nodes are gathered one by one
@@ -48,9 +48,9 @@ enum class WindowShape : int32_t {
 
 /// The part of a node image that registers hold for the cells of neighbouring pixels.
 struct Window {
-  int64_t first;  ///< of its nodes in the image
-  Ints lane;      ///< of each cell's lower s node; unless wide, kLanes on for cells in an odd row
-  Ints row;       ///< of each cell's lower t node, from the window's first
+  int64_t first;  ///< number of its first node in the image
+  Ints lane;      ///< each cell's lower s node; unless wide, kLanes more for cells in an odd row
+  Ints row;       ///< each cell's lower t node, counted from the window's first
   WindowShape shape;
 };
 
@@ -58,12 +58,12 @@ struct Window {
 struct Cells {
   Floats inverse_depth;
   Floats s, t;                ///< node coordinates, clamped to the image
-  Floats s_weight, t_weight;  ///< of the upper nodes
+  Floats s_weight, t_weight;  ///< weights of the upper nodes
   Ints s_node, t_node;        ///< lower nodes
   Window window;
 };
 
-/// Upper limits for clamped coordinates: the largest numbers below those of the last node.
+/// Upper limits of clamped coordinates: the largest numbers below those of the last node.
 struct Limits {
   float s, t;
 };
@@ -98,8 +98,8 @@ AF_KERNEL_INLINE Window window_of(const Cells& cells, const LeastLanes& least, i
                 column + row * kLanes,
                 row,
                 WindowShape::NoWindow};
-  // No high bit is set exactly when both are at least 0, column < kLanes and row < 2, or 4, or
-  // column < 2 kLanes and row < 2.
+  // No high bit is set exactly when both are at least 0 and within the window: column < kLanes and
+  // row < 2 or 4, or column < 2 kLanes and row < 2.
   constexpr int32_t kHighBits = ~(kLanes - 1);
   if (!native::any_bit(column | row * (kLanes / 2), kHighBits)) {
     window.shape = WindowShape::TwoRows;
@@ -112,7 +112,7 @@ AF_KERNEL_INLINE Window window_of(const Cells& cells, const LeastLanes& least, i
   return window;
 }
 #else
-// Without instructions that pick lanes, all values are gathered.
+// Without instructions that pick lanes, all values must be gathered.
 AF_KERNEL_INLINE LeastLanes least_lanes(const WarpRow& /*row*/) {
   return LeastLanes();
 }
@@ -135,13 +135,13 @@ AF_KERNEL_INLINE Cells cells_of(const Limits& limits, const WarpRow& row, Floats
   return cells;
 }
 
-/// Interpolated along s in the two rows of each cell, and the differences along s.
+/// Values interpolated along s in the two rows of each cell, and their differences along s.
 struct RowPair {
   Floats low, high;
   Floats low_slope, high_slope;
 };
 
-/// The nodes of one column in both rows of each cell.
+/// The nodes of one column, in both rows of each cell.
 struct Column {
   Floats low, high;
 };
@@ -216,18 +216,19 @@ struct RayDirections {
   Floats m_x, m_z;
 };
 
-AF_KERNEL_INLINE RayDirections directions_of(const PoseSlopes& of, const Cells& cells) {
-  return {cells.s * of.m_scale[0] + of.m_offset[0], cells.t * of.m_scale[1] + of.m_offset[1]};
+AF_KERNEL_INLINE RayDirections directions_of(const PoseSlopes& slopes, const Cells& cells) {
+  return {cells.s * slopes.m_scale[0] + slopes.m_offset[0],
+          cells.t * slopes.m_scale[1] + slopes.m_offset[1]};
 }
 
-/// The source's motion parallel to the planes that does to each cell's ray what its whole motion
-/// does: along the ray nothing changes.
+/// The motion of the source parallel to the planes that does to each cell's ray what its whole
+/// motion does. Motion along the ray changes nothing.
 struct ParallelMotion {
   Floats x, z;
 };
 
-AF_KERNEL_INLINE ParallelMotion parallel_motion(const PoseSlopes& of, const RayDirections& m) {
-  const float(&move)[3] = of.source_move;
+AF_KERNEL_INLINE ParallelMotion parallel_motion(const PoseSlopes& slopes, const RayDirections& m) {
+  const float(&move)[3] = slopes.source_move;
   return {move[0] - m.m_x * move[1], move[2] - m.m_z * move[1]};
 }
 
@@ -241,7 +242,7 @@ AF_KERNEL_INLINE NodeSlopes slopes_of(const RowPair& pair, const Cells& cells) {
           pair.high - pair.low};
 }
 
-/// Neighbouring pixels of a row, one per lane; the last ones of a row may be fewer.
+/// Neighbouring pixels of a row, one per lane. The last run of a row may have fewer.
 struct PixelRun {
   int64_t offset;
   int32_t count;
@@ -259,7 +260,7 @@ AF_KERNEL_INLINE void put(const PixelRun& run, float* values, Floats value) {
 }
 
 /// Calls work(row, cells, run) for all pixels. Arguments come as copies: the compiler cannot know
-/// that stores to pixels do not change what references refer to, and would load it again and again.
+/// that stores to pixels leave alone what references refer to, and would load it again and again.
 template <typename Work>
 AF_KERNEL_INLINE void for_each_run(NodeImage image,
                                    Homography homography,
@@ -296,53 +297,53 @@ void warp_image(const NodeImage& image,
 }
 
 void warp_moved_image(const NodeImage& image,
-                      const PoseSlopes& slopes,
+                      const PoseSlopes& given,
                       const Homography& homography,
                       const PixelGrid& grid,
                       float* values) {
   const NodeImage from = image;
-  const PoseSlopes of = slopes;
+  const PoseSlopes slopes = given;
   for_each_run(
       from, homography, grid, [=](const WarpRow& /*row*/, const Cells& cells, const PixelRun& run) {
         const Floats value = value_of(sample(from.values, from.stride, cells), cells);
-        const Floats g_x = value_of(sample(of.source_x, from.stride, cells), cells);
-        const Floats g_z = value_of(sample(of.source_z, from.stride, cells), cells);
-        const ParallelMotion move = parallel_motion(of, directions_of(of, cells));
+        const Floats g_x = value_of(sample(slopes.source_x, from.stride, cells), cells);
+        const Floats g_z = value_of(sample(slopes.source_z, from.stride, cells), cells);
+        const ParallelMotion move = parallel_motion(slopes, directions_of(slopes, cells));
         put(run, values, value + (g_x * move.x + g_z * move.z));
       });
 }
 
 void warp_with_pose_slopes(const NodeImage& image,
-                           const PoseSlopes& slopes,
+                           const PoseSlopes& given,
                            const Homography& homography,
                            const PixelGrid& grid,
                            float* values,
                            float* planes,
                            int64_t plane_stride) {
   const NodeImage from = image;
-  const PoseSlopes of = slopes;
+  const PoseSlopes slopes = given;
   for_each_run(
       from, homography, grid, [=](const WarpRow& /*row*/, const Cells& cells, const PixelRun& run) {
         const RowPair pair = sample(from.values, from.stride, cells);
-        const RowPair pair_x = sample(of.source_x, from.stride, cells);
-        const RowPair pair_z = sample(of.source_z, from.stride, cells);
+        const RowPair pair_x = sample(slopes.source_x, from.stride, cells);
+        const RowPair pair_z = sample(slopes.source_z, from.stride, cells);
         const Floats g_x = value_of(pair_x, cells);
         const Floats g_z = value_of(pair_z, cells);
-        const RayDirections m = directions_of(of, cells);
+        const RayDirections m = directions_of(slopes, cells);
         const Floats m_x = m.m_x;
         const Floats m_z = m.m_z;
-        const ParallelMotion move = parallel_motion(of, m);
+        const ParallelMotion move = parallel_motion(slopes, m);
         put(run, values, value_of(pair, cells) + (g_x * move.x + g_z * move.z));
-        // The slopes of that sum; m changes along s and t, too.
+        // The slopes of that sum. m changes along s and t, too.
         const NodeSlopes of_value = slopes_of(pair, cells);
         const NodeSlopes of_x = slopes_of(pair_x, cells);
         const NodeSlopes of_z = slopes_of(pair_z, cells);
-        const float along_s = of.m_scale[0] * of.source_move[1];
-        const float along_t = of.m_scale[1] * of.source_move[1];
-        const Floats f_x =
-            of.nodes_per_mm[0] * (of_value.s + (of_x.s * move.x + of_z.s * move.z - along_s * g_x));
-        const Floats f_z =
-            of.nodes_per_mm[1] * (of_value.t + (of_x.t * move.x + of_z.t * move.z - along_t * g_z));
+        const float along_s = slopes.m_scale[0] * slopes.source_move[1];
+        const float along_t = slopes.m_scale[1] * slopes.source_move[1];
+        const Floats f_x = slopes.nodes_per_mm[0] *
+                           (of_value.s + (of_x.s * move.x + of_z.s * move.z - along_s * g_x));
+        const Floats f_z = slopes.nodes_per_mm[1] *
+                           (of_value.t + (of_x.t * move.x + of_z.t * move.z - along_t * g_z));
         // Forces are perpendicular to the ray.
         const Floats f_y = -(m_x * f_x + m_z * f_z);
         const Floats force[3] = {f_x + g_x, f_y - (m_x * g_x + m_z * g_z), f_z + g_z};
@@ -350,11 +351,11 @@ void warp_with_pose_slopes(const NodeImage& image,
         for (int axis = 0; axis < 3; ++axis) {
           put(run,
               planes + axis * plane_stride,
-              product(of.rotation_of_moment[axis], moment) +
-                  product(of.rotation_of_force[axis], force));
+              product(slopes.rotation_of_moment[axis], moment) +
+                  product(slopes.rotation_of_force[axis], force));
           put(run,
               planes + (axis + 3) * plane_stride,
-              product(of.translation_of_force[axis], force));
+              product(slopes.translation_of_force[axis], force));
         }
       });
 }

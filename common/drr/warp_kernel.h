@@ -5,7 +5,7 @@
 
 namespace af {
 
-/// Node coordinates of detector pixels: s(c, r) = S / D, t = T / D, each of S, T and D being
+/// Node coordinates of detector pixels: s(c, r) = S / D and t = T / D. Each of S, T and D is
 /// affine: [0] + c [1] + r [2].
 struct Homography {
   double s[3];
@@ -13,7 +13,7 @@ struct Homography {
   double d[3];
 };
 
-/// Image of (s,t) nodes: s fastest, at least 2 x 2; readable for four rows and 32 values beyond its
+/// Image of (s,t) nodes: s fastest, at least 2 x 2. Readable for four rows and 32 values beyond its
 /// end.
 struct NodeImage {
   const float* values;
@@ -37,33 +37,33 @@ using WarpImage = void (*)(const NodeImage& image,
 
 /// Turns slopes of node images into derivatives by motions of the CT. In the slab frame a ray
 /// through `source` meets the node plane at source + reach (m_x, 1, m_z). The ray's motion changes
-/// a pixel as forces do work along a motion: F = (I_x, ., I_z) at the node plane (the image's
-/// slopes per mm) and G at the source (the blended viewpoints' slopes), both perpendicular to the
-/// ray.
+/// a pixel as forces do work along a motion. The forces are F = (I_x, ., I_z) at the node plane
+/// (the image's slopes per mm) and G at the source (the blended viewpoints' slopes), both
+/// perpendicular to the ray.
 struct PoseSlopes {
   const float* source_x;  ///< G_x, per mm, a node image like the value's
   const float* source_z;  ///< G_z
   float nodes_per_mm[2];  ///< along s, t
-  float m_scale[2];       ///< m_x = m_scale[0] s + m_offset[0], m_z likewise of t
+  float m_scale[2];       ///< m_x = m_scale[0] s + m_offset[0], and m_z likewise from t
   float m_offset[2];
-  float source_move[3];  ///< mm, by which the source has moved since the images were made
-  /// One row per room axis: the coefficients of F + G, of (m_x, 1, m_z) x F and of F + G again in
+  float source_move[3];  ///< mm that the source has moved since the images were made
+  /// One row per room axis: the coefficients that F + G, (m_x, 1, m_z) x F and again F + G have in
   /// the derivatives.
   float translation_of_force[3][3];
   float rotation_of_moment[3][3];
   float rotation_of_force[3][3];
 };
 
-/// The same for images that were made for another source: the values are corrected along the slopes
-/// by PoseSlopes::source_move.
+/// The same for images that were made for another source. PoseSlopes::source_move corrects the
+/// values along the slopes.
 using WarpMovedImage = void (*)(const NodeImage& image,
                                 const PoseSlopes& slopes,
                                 const Homography& homography,
                                 const PixelGrid& grid,
                                 float* values);
 
-/// The same, moved likewise, with six planes of rows x columns derivatives, `plane_stride` values
-/// apart, in the order of PoseGradients.
+/// The same, corrected likewise, with six planes of rows x columns derivatives, `plane_stride`
+/// values apart, in the order of PoseGradients.
 using WarpWithPoseSlopes = void (*)(const NodeImage& image,
                                     const PoseSlopes& slopes,
                                     const Homography& homography,
@@ -72,7 +72,7 @@ using WarpWithPoseSlopes = void (*)(const NodeImage& image,
                                     float* planes,
                                     int64_t plane_stride);
 
-/// Resamples two node images, the slopes of one per node along s and t, to its slopes per pixel
+/// Resamples two node images, which are the slopes per node along s and t, to slopes per pixel
 /// along columns and rows.
 using WarpSlopes = void (*)(const NodeImage& s_slopes,
                             const float* t_slopes,

@@ -11,12 +11,12 @@
 
 namespace af {
 
-/// The X-rays that DRRs simulate; by default of one energy and without scatter.
+/// The X-rays that DRRs simulate, by default with one energy and no scatter.
 struct XrayBeamOptions {
   SpectrumOptions spectrum = SpectrumOptions::one_energy();
   double scatter_to_primary = 0.0;
 
-  /// Whether a renderer of the bone's part is needed beside the ordinary one.
+  /// Whether the bone's part needs a renderer beside the ordinary one.
   [[nodiscard]] bool needs_bone() const { return !spectrum.is_one_energy(); }
   /// Whether DRRs are those of the ordinary renderer, unchanged.
   [[nodiscard]] bool is_ordinary() const { return !needs_bone() && scatter_to_primary == 0.0; }
@@ -26,11 +26,12 @@ struct XrayBeamOptions {
 /// Turns renderers of ordinary DRRs into those of a beam.
 class XrayBeam {
  public:
-  /// `model`: of the ordinary DRRs. InputError when its mu_water fits no energy of a spectrum.
+  /// `model`: that of the ordinary DRRs. Throws InputError when its mu_water fits no energy of a
+  /// spectrum.
   XrayBeam(const XrayBeamOptions& options, const AttenuationModel& model);
 
-  /// Returns the ordinary renderer itself when the beam is of one energy and without scatter.
-  /// `bone` is required where needs_bone().
+  /// Returns the ordinary renderer itself when the beam has one energy and no scatter. `bone` is
+  /// required where needs_bone().
   [[nodiscard]] std::shared_ptr<const DrrRenderer> renderer(
       std::shared_ptr<const DrrRenderer> all, std::shared_ptr<const DrrRenderer> bone) const;
 

@@ -14,7 +14,7 @@ struct SpectrumOptions {
   double tube_kvp = 100.0;    ///< 0: one energy, the effective energy of the CT's HU scale
   double aluminium_mm = 3.0;  ///< total filtration
 
-  /// The effective energy alone: Beer and Lambert's law.
+  /// The effective energy alone, as in Beer and Lambert's law.
   static SpectrumOptions one_energy();
   [[nodiscard]] bool is_one_energy() const { return tube_kvp == 0.0; }
 
@@ -23,20 +23,20 @@ struct SpectrumOptions {
 
 std::vector<std::string> problems(const SpectrumOptions& options);
 
-/// One energy bin, of those of equal width between 10 keV and the tube voltage.
+/// One of the energy bins of equal width between 10 keV and the tube voltage.
 struct SpectrumBin {
   double energy_kev;  ///< centre
   double weight;      ///< share of the open beam's detector signal
 };
 
-/// Detected spectrum of the open beam; weights sum to 1. Thick-target bremsstrahlung by Kramers'
-/// law (H. A. Kramers, Phil. Mag. 46:836, 1923): photons per keV ~ (kVp - E) / E, filtered by
-/// aluminium; an ideal energy-integrating detector weights every photon by E. Characteristic lines
-/// and the detector's own absorption are left out.
+/// Detected spectrum of the open beam; weights sum to 1. It is thick-target bremsstrahlung by
+/// Kramers' law (H. A. Kramers, Phil. Mag. 46:836, 1923): photons per keV ~ (kVp - E) / E, filtered
+/// by aluminium. An ideal energy-integrating detector weights every photon by E. Characteristic
+/// lines and the detector's own absorption are left out.
 std::vector<SpectrumBin> tube_spectrum(const SpectrumOptions& options, double effective_energy_kev);
 
-/// Lengths of material along one ray: of water and bone, mm of water that attenuate alike at the
-/// effective energy.
+/// Lengths of material along one ray. Water and bone are given as mm of water that attenuate alike
+/// at the effective energy.
 struct RayMaterials {
   double water_mm = 0.0;
   double bone_mm = 0.0;

@@ -14,10 +14,10 @@ struct AtlasMember {
   LightSlab light_slab;
 };
 
-/// Fields of one CT, such as those of a C-arm's orbit, that share a quantiser and a codebook. It
-/// holds no indices: these are read member by member, as they are needed.
+/// Fields of one CT, such as those of a C-arm's orbit, that share a quantiser and a codebook. The
+/// atlas holds no indices: they are read member by member, as they are needed.
 struct AttenuationAtlas {
-  /// The camera and frame that the members were derived from, and the range about the nominal pose
+  /// The camera and frame from which the members were derived, and the range about the nominal pose
   /// that they hold together at each of their angles.
   FieldIdentity identity;
   std::vector<AtlasMember> members;

@@ -5,8 +5,8 @@
 
 namespace af {
 
-/// Uniform 16-bit quantiser of total attenuation: q = round(U / step), 0 only for U below half a
-/// step.
+/// Uniform 16-bit quantiser of total attenuation: q = round(U / step). q is 0 only for U below half
+/// a step.
 class AttenuationQuantizer {
  public:
   /// `step` > 0: attenuation per level, dimensionless.
@@ -15,7 +15,7 @@ class AttenuationQuantizer {
   static AttenuationQuantizer for_maximum(double max_total_attenuation);
 
   [[nodiscard]] float step() const { return step_; }
-  /// To the nearest level, as quantize_node() of shear_warp_kernel does.
+  /// Rounds to the nearest level, as quantize_node() of shear_warp_kernel does.
   [[nodiscard]] std::uint16_t quantize(float total_attenuation) const;
   [[nodiscard]] float dequantize(std::uint16_t level) const {
     return step_ * static_cast<float>(level);

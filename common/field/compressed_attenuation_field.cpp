@@ -24,7 +24,7 @@ class SlabTiles {
   [[nodiscard]] std::uint16_t mean(const std::array<int, 4>& tile) const {
     return codebook_.has_means() ? values_[position(tile) + row()] : std::uint16_t{0};
   }
-  /// Of a neighbour as decoded, before levels are limited.
+  /// Coefficients of a neighbour as decoded, before levels are limited.
   [[nodiscard]] TileCoefficients coefficients(const std::array<int, 4>& tile,
                                               const TileOffset& offset) const {
     const auto at = neighbouring_tile(tile, offset, counts_);
@@ -45,7 +45,8 @@ class SlabTiles {
   std::array<int, 4> counts_;
 };
 
-/// A level of a tile by a codebook's filter: the definition, slow. FieldLevel has all levels.
+/// A level of a tile by a codebook's filter. This is the definition, and slow; FieldLevel computes
+/// all levels.
 double filtered_level(const SlabTiles& tiles,
                       const TileFilter& filter,
                       const std::array<int, 4>& tile,
@@ -73,14 +74,14 @@ double filtered_level(const SlabTiles& tiles,
       std::floor(level / static_cast<double>(kTileElements) + 0.5), 0.0, kLargestLevel);
 }
 
-/// Without branches, so that compilers make vectors of it.
+/// Has no branches, so that compilers vectorise it.
 std::uint16_t largest(std::span<const std::uint16_t> values) {
   std::uint16_t result = 0;
   for (const std::uint16_t value : values) result = std::max(result, value);
   return result;
 }
 
-/// Whether means are multiples of `step`, and 0 where the index is. Multiplies by the step's
+/// Whether means are multiples of `step`, and 0 where the index is 0. Multiplies by the step's
 /// reciprocal, rounded up to 2^-32, which divides any 16-bit number exactly.
 bool are_means(std::span<const std::uint16_t> indices,
                std::span<const std::uint16_t> means,

@@ -19,7 +19,7 @@ namespace af {
 /// A bone field accompanies a field of all attenuation, for DRRs of polychromatic X-rays.
 enum class FieldMaterial { All, Bone };
 
-/// What a field was made from and for; travels with it.
+/// What a field was made from and for. It travels with the field.
 struct FieldIdentity {
   CameraGeometry camera;  ///< the camera it was sized for
   PoseFrame frame;        ///< (R0, c, r)
@@ -31,8 +31,8 @@ struct FieldIdentity {
 };
 
 /// Codeword indices (and means, in levels) of one slab, stored as Codebook says, t fastest. Tile
-/// (a, b, c, d) holds nodes 2a.., 2b.., 2c.., 2d.. of what is stored along each axis; odd ends are
-/// padded by edge replication.
+/// (a, b, c, d) holds nodes 2a.., 2b.., 2c.., 2d.. of the stored nodes along each axis. Edge
+/// replication pads odd ends.
 struct CompressedSlab {
   SharedArray<std::uint16_t> indices;
 };
@@ -48,20 +48,19 @@ struct NodeIndex {
 /// A vector-quantised attenuation field: sum over slabs of decoded tiles times the quantiser step.
 struct CompressedAttenuationField {
   FieldIdentity identity;
-  LightSlab light_slab;         ///< for code that asks where nodes lie; other code: lattice()
+  LightSlab light_slab;         ///< for code that asks where nodes lie; other code uses lattice()
   float quantizer_step = 0.0f;  ///< one for all slabs
   Codebook codebook;
   std::vector<CompressedSlab> slabs;  ///< in the order of light_slab.slabs
 
   [[nodiscard]] SlabLattice lattice(std::size_t slab) const { return light_slab.lattice(slab); }
   [[nodiscard]] FieldLattice lattice() const { return light_slab.lattice(); }
-  /// Decoded total attenuation at a stored or unstored lattice node of one slab (0 outside the
-  /// stored range).
+  /// Decoded total attenuation at a lattice node of one slab; 0 outside the stored range.
   [[nodiscard]] float node_value(std::size_t slab, const NodeIndex& node) const;
 };
 
-/// Why rows of indices (each followed by its row of means where the codebook has them) cannot
-/// belong to a field with this codebook; empty when they can. `row`: tiles per row.
+/// Why rows of indices cannot belong to a field with this codebook; empty when they can. Where the
+/// codebook has means, a row of them follows each row. `row`: tiles per row.
 std::vector<std::string> index_problems(std::span<const std::uint16_t> values,
                                         std::size_t row,
                                         const Codebook& codebook,

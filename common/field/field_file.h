@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a field file says of itself; written by field_writing.h, read by field_reading.h.
+// What a field file says of itself. field_writing.h writes it, field_reading.h reads it.
 #pragma once
 
 #include <cstdint>
@@ -21,8 +21,8 @@ struct FieldFileInfo {
   std::string payload_sha256;  ///< over the named datasets in fixed order
   std::uint64_t file_bytes = 0;
   std::uint64_t payload_bytes = 0;  ///< indices, means and codebook, by the bits stored
-  /// The look-up for DRRs that the field's options name: "linear", also when they name none, or
-  /// "cubic".
+  /// How DRRs look the field up, as its options say: "cubic", or "linear", also when they name
+  /// none.
   std::string look_up = "linear";
 };
 

@@ -22,7 +22,7 @@ namespace {
 using hdf5::checked;
 using hdf5::Handle;
 
-/// Deflate shrinks nothing by more than this.
+/// Deflate never shrinks data by more than this.
 constexpr std::uint64_t kMaxPackingRatio = 1032;
 
 void check_version(hid_t file, const std::filesystem::path& path) {
@@ -43,7 +43,7 @@ CodebookParts read_codebook_parts(hid_t file) {
   return {has_object(file, kMeanStepDataset), has_object(file, kTileFilterDataset)};
 }
 
-/// Whether a file of this size can hold so many indices at all; refuses before memory is asked for.
+/// Refuses a file that is too small to hold so many indices, before memory is asked for.
 void check_plausible_size(const DatasetRule& rule,
                           std::uint64_t file_bytes,
                           const std::filesystem::path& path) {
@@ -66,13 +66,14 @@ std::vector<Dataset> read_datasets(hid_t file,
   return datasets;
 }
 
-/// Of a group, "" for the root; none where the file has none.
+/// The range of a group ("" for the root); none where the file has none.
 std::vector<Dataset> read_range(hid_t file, const std::string& group, const std::string& path) {
   if (!has_object(file, group + "/range")) return {};
   return read_datasets(file, within(group, range_rules()), path);
 }
 
-/// The field of a group, "" for the root. `shared`: what stands in the root for all of an atlas.
+/// The field of a group ("" for the root). `shared`: what the root holds for all members of an
+/// atlas.
 FieldHeader read_field_of(hid_t file,
                           const std::string& group,
                           std::span<const Dataset> shared,
@@ -103,7 +104,7 @@ FieldHeader read_field_of(hid_t file,
   return header;
 }
 
-/// The root of an atlas, and its members.
+/// Reads the root of an atlas, and its members.
 void read_members(hid_t file, const std::filesystem::path& path, FileHeader& header) {
   header.root = read_datasets(file, atlas_rules(header.codebook), path.string());
   header.root_range = read_range(file, "", path.string());
@@ -114,7 +115,7 @@ void read_members(hid_t file, const std::filesystem::path& path, FileHeader& hea
         read_field_of(file, member_group(static_cast<std::size_t>(i)), shared, header, path));
 }
 
-/// Of everything that a file says of its content.
+/// Hash of everything that a file says of its content.
 std::string payload_hash(const FileHeader& header) {
   std::vector<Dataset> datasets = header.root;
   std::vector<DatasetRule> rules;
@@ -130,7 +131,7 @@ std::string payload_hash(const FileHeader& header) {
   return payload_hash(datasets, rules, index_sha256);
 }
 
-/// An atlas is of one CT, all of it or its bone, and so are its members.
+/// An atlas is made from one CT, either all of it or its bone, and so are its members.
 void require_same_origin(const AttenuationAtlas& atlas, const std::filesystem::path& path) {
   const FieldIdentity& all = atlas.identity;
   for (std::size_t i = 0; i < atlas.members.size(); ++i) {
@@ -149,7 +150,7 @@ void require_same_origin(const AttenuationAtlas& atlas, const std::filesystem::p
   }
 }
 
-/// Rank 0 alone.
+/// For rank 0 alone.
 FileHeader read_header(const std::filesystem::path& path) {
   check_is_hdf5(path);
   note_input(path);
@@ -177,8 +178,8 @@ FileHeader read_header(const std::filesystem::path& path) {
   return header;
 }
 
-/// The look-up that a field's options name, "linear" where they name none. FileError when there is
-/// no such way.
+/// The look-up that a field's options name, "linear" where they name none. Throws FileError for an
+/// unknown name.
 std::string look_up_of(const FieldProvenance& provenance, const std::string& path) {
   const std::string key = "look_up = ";
   std::istringstream lines(provenance.options_toml);

@@ -44,7 +44,7 @@ DatasetRule tile_filter_rule() {
           "Hadamard coefficient of a tile, input"};
 }
 
-/// Of the codebook, in the order of the payload hash.
+/// Rules of the codebook's datasets, in the order of the payload hash.
 std::vector<DatasetRule> codebook_rules(const CodebookParts& parts) {
   std::vector<DatasetRule> rules = {step_rule(), codewords_rule()};
   if (parts.has_means) rules.push_back(mean_step_rule());
@@ -52,7 +52,7 @@ std::vector<DatasetRule> codebook_rules(const CodebookParts& parts) {
   return rules;
 }
 
-/// Of a field's geometry that has as many slabs as the file.
+/// The values of a field's geometry, which must have as many slabs as the file.
 StoredValues stored_values(LightSlab& planes) {
   StoredValues values("/geometry/");
   values.matrix("slab_from_ct", planes.slab_from_ct.matrix(), "mm", "slab from ct");
@@ -77,8 +77,8 @@ StoredValues stored_values(LightSlab& planes) {
   return values;
 }
 
-/// An identity as files hold it. Two numbers state the motion range; of a range that two numbers
-/// cannot state (range_rules()), the largest part that they can.
+/// An identity as files hold it. Two numbers state the motion range. For a range that two numbers
+/// cannot state (range_rules()), they state the largest part that they can.
 struct StoredIdentity {
   FieldIdentity identity;
   double max_rotation_rad = 0.0;
@@ -119,7 +119,7 @@ StoredValues stored_values(StoredIdentity& stored) {
   return values;
 }
 
-/// Bounds of a range that two numbers do not state.
+/// The bounds of a range that two numbers cannot state.
 StoredValues stored_values(MotionRange& range) {
   StoredValues values("/range/");
   values.matrix("low_rad", range.low.rotation_rad, "rad", "room");
@@ -134,7 +134,7 @@ void append_datasets(Struct described, std::vector<Dataset>& datasets) {
   append_datasets(stored_values(described), datasets);
 }
 
-/// What must hold before the indices can even be looked for; without planes, when there are none.
+/// What must hold before the indices can even be looked for. Without planes, when there are none.
 std::vector<std::string> header_problems(const FieldIdentity& identity,
                                          const Codebook& codebook,
                                          float quantizer_step,
@@ -155,7 +155,7 @@ std::vector<std::string> header_problems(const FieldIdentity& identity,
   return found;
 }
 
-/// From the first datasets; returns the others.
+/// Sets the identity from the first datasets, and returns the others.
 std::span<const Dataset> set_identity(std::span<const Dataset> datasets,
                                       const std::string& path,
                                       FieldIdentity& identity) {
@@ -166,7 +166,7 @@ std::span<const Dataset> set_identity(std::span<const Dataset> datasets,
   return datasets;
 }
 
-/// From the datasets of shared_rules().
+/// Sets the codebook from the datasets of shared_rules().
 void set_codebook(std::span<const Dataset> datasets,
                   const std::string& path,
                   float& quantizer_step,

@@ -27,7 +27,7 @@ using field_layout::shared_header;
 using hdf5::Handle;
 using hdf5::naming_file;
 
-/// Reads and verifies the indices of one slab into memory for all of them.
+/// Reads and verifies the indices of one slab, which ranks of a node share in memory.
 void read_indices(const std::filesystem::path& path,
                   const DatasetRule& rule,
                   const std::string& expected_sha256,
@@ -51,8 +51,8 @@ void read_indices(const std::filesystem::path& path,
   if (!found.empty()) throw FileError(path.string(), found.front());
 }
 
-/// Collective. The indices of all slabs, held once per node. Rank 0's node reads them for all: its
-/// ranks take the slabs in turn, since to unpack them is most of the work of opening a field.
+/// Collective. The indices of all slabs, held once per node. Rank 0's node reads them for all. Its
+/// ranks take the slabs in turn, because unpacking is most of the work of opening a field.
 std::vector<CompressedSlab> read_slabs(const FieldHeader& header,
                                        const std::filesystem::path& path,
                                        const Codebook& codebook,
@@ -82,7 +82,7 @@ std::vector<CompressedSlab> read_slabs(const FieldHeader& header,
   return slabs;
 }
 
-/// Collective. A field of a file with its indices.
+/// Collective. A field from a file, with its indices.
 std::shared_ptr<const CompressedAttenuationField> field_with_indices(
     const FieldHeader& header,
     const std::filesystem::path& path,
@@ -188,7 +188,7 @@ std::shared_ptr<const CompressedAttenuationField> read_atlas_member(
     std::size_t member,
     const std::string& payload_sha256,
     const Communicator& communicator) {
-  const ReadingTurn turn;  // HDF5 is for one thread
+  const ReadingTurn turn;  // HDF5 may be used by one thread at a time
   const hdf5::QuietErrors quiet;
   const FileHeader header = shared_header(true, path, communicator);
   all_or_none(communicator, [&] {

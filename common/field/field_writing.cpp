@@ -81,7 +81,7 @@ struct FileContents {
   const char* format = field_layout::kFormat;
   std::string ct_sha256;
   std::vector<Dataset> payload;
-  std::vector<Dataset> beside;  ///< not of the payload: ranges that two numbers do not state, bone
+  std::vector<Dataset> beside;  ///< outside the payload: ranges that two numbers cannot state, bone
   std::vector<DatasetRule> indices;
   std::uint64_t payload_bytes = 0;
 };
@@ -120,7 +120,7 @@ FileContents contents_of(const AttenuationAtlas& atlas) {
   return contents;
 }
 
-/// Rank 0 alone: everything but the indices and the provenance.
+/// For rank 0 alone. Writes everything but the indices and the provenance.
 void create_file_without_indices(const FileContents& contents, const std::filesystem::path& path) {
   Handle file = hdf5::create_file(path);
   hdf5::write_text_attribute(file, "format", contents.format);
@@ -156,8 +156,8 @@ class MpiInfo {
   MPI_Info info_ = MPI_INFO_NULL;
 };
 
-/// Rank 0 alone. Hints on a file's layout (stripes) count only when it is created: if there are
-/// hints, MPI-IO creates the file, and HDF5 writes into it.
+/// For rank 0 alone. Hints on a file's layout (stripes) count only when it is created. If there are
+/// hints, MPI-IO therefore creates the file, and HDF5 writes into it.
 void lay_out(const std::filesystem::path& path, const MpiIoHints& hints) {
   if (hints.empty()) return;
   std::error_code ignored;
@@ -171,9 +171,9 @@ void lay_out(const std::filesystem::path& path, const MpiIoHints& hints) {
   MPI_File_close(&file);
 }
 
-/// The open file of all ranks. After a failed write it can neither be written nor closed: some
-/// ranks know of the failure and others wait for them within MPI-IO. So a rank that fails throws at
-/// once, the file stays open, and the job must end by abort.
+/// The file that all ranks have open. After a failed write it can neither be written nor closed:
+/// some ranks know of the failure, and others wait for them within MPI-IO. A rank that fails
+/// therefore throws at once, the file stays open, and the job must end by abort.
 class SharedFile {
  public:
   /// Collective.
@@ -194,7 +194,7 @@ class SharedFile {
     });
   }
 
-  /// Collective. Writes the blocks of all ranks, slab by slab, one block of every rank at a time.
+  /// Collective. Writes the blocks of all ranks slab by slab, one block of every rank at a time.
   void write(std::vector<IndexBlock>& blocks) {
     std::vector<std::uint64_t> most_blocks(rules_.size(), 0);
     for (const IndexBlock& block : blocks) ++most_blocks[block.slab];
@@ -218,8 +218,8 @@ class SharedFile {
     }
   }
 
-  /// Collective. Open MPI may lose what a collective write could not store without a word; then
-  /// this fails, or what is read back differs.
+  /// Collective. Open MPI may silently lose what a collective write could not store. Then this
+  /// fails, or what is read back differs.
   void close() {
     const WorkNote note("closing the file that all ranks wrote");
     naming_file(path_,
@@ -233,7 +233,7 @@ class SharedFile {
   hid_t file_ = H5I_INVALID_HID;
 };
 
-/// Collective. Writes blocks in rounds until no rank has any; returns the hash sums of each slab
+/// Collective. Writes blocks in rounds until no rank has any. Returns the hash sums of each slab
 /// over all ranks.
 std::vector<std::uint64_t> write_rounds(SharedFile& file,
                                         const std::vector<DatasetRule>& rules,
@@ -274,13 +274,13 @@ std::vector<std::uint64_t> write_indices(const std::filesystem::path& path,
     file.close();
     return sums;
   } catch (const Error& error) {
-    // A stop is thrown on every rank, and nothing is wrong with the file.
+    // A stop is thrown on every rank, and the file is intact.
     if (error.exit_code() == ExitCode::Stopped) file.close();
     throw;
   }
 }
 
-/// Reads every index of a slab back and compares with what the ranks wrote; its hash.
+/// Reads every index of a slab back, compares with what the ranks wrote, and returns its hash.
 std::string verified_sha256(hid_t file,
                             const DatasetRule& rule,
                             std::uint64_t written_sum,
@@ -305,12 +305,12 @@ std::string verified_sha256(hid_t file,
   return sha256.hex_digest();
 }
 
-/// Collective. The hash of every slab's indices, read back; ranks take the slabs in turn.
+/// Collective. The hash of every slab's indices, read back. Ranks take the slabs in turn.
 std::vector<std::string> verify_indices(const std::vector<DatasetRule>& rules,
                                         const std::vector<std::uint64_t>& written_sums,
                                         const std::filesystem::path& path,
                                         const Communicator& communicator) {
-  // On network file systems ranks see what others wrote once these have closed the file.
+  // On network file systems, ranks see what others wrote only once those have closed the file.
   communicator.barrier();
   const auto ranks = static_cast<std::size_t>(communicator.size());
   const auto mine = all_or_none(communicator, [&] {
@@ -334,7 +334,7 @@ std::vector<std::string> verify_indices(const std::vector<DatasetRule>& rules,
   return all;
 }
 
-/// Rank 0 alone: stores the hashes and the provenance.
+/// For rank 0 alone. Stores the hashes and the provenance.
 std::string seal(const FileContents& contents,
                  const FieldProvenance& provenance,
                  const std::vector<std::string>& index_sha256,
@@ -372,8 +372,8 @@ FieldFileInfo write_file(const FileContents& contents,
   const std::filesystem::path partial = field_layout::unfinished_path(path);
   FieldFileInfo info;
   info.payload_bytes = contents.payload_bytes;
-  // Not in the block below, which removes the partial file on failure: this check may refuse a file
-  // that this program did not make.
+  // This check stays out of the block below, which removes the partial file on failure: it may
+  // refuse a file that this program did not make.
   do_on_root(communicator, [&] { check_output_file(path, partial); });
   try {
     do_on_root(communicator, [&] {
@@ -395,7 +395,7 @@ FieldFileInfo write_file(const FileContents& contents,
     info.payload_sha256 = sealed->payload_sha256;
     info.file_bytes = sealed->file_bytes;
   } catch (const Error& error) {
-    // When MPI is finalised, HDF5 would retry the failed write.
+    // HDF5 would retry the failed write when MPI is finalised.
     if (error.exit_code() != ExitCode::Stopped) MpiEnvironment::require_abort();
     std::error_code ignored;
     if (communicator.is_root()) std::filesystem::remove(partial, ignored);

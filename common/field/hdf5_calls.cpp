@@ -73,7 +73,8 @@ bool is_type_of(hid_t type, const DatasetRule& rule) {
   return checked(H5Tequal(type, expected), "H5Tequal") > 0;
 }
 
-/// Every part of an object's path must be an object of this file: links may lead to other files.
+/// Every part of an object's path must be an object of this file, because links may lead to other
+/// files.
 void check_is_of_this_file(hid_t file, const DatasetRule& rule, const std::string& path) {
   for (std::size_t end = rule.name.find('/', 1);; end = rule.name.find('/', end + 1)) {
     const std::string part = rule.name.substr(0, end);
@@ -86,8 +87,8 @@ void check_is_of_this_file(hid_t file, const DatasetRule& rule, const std::strin
   }
 }
 
-/// Contents of this file itself, in pieces that fit in memory, by filters that HDF5 has built in:
-/// not those of another file (external, virtual), and nothing that loads a plug-in.
+/// Contents must be those of this file itself, in pieces that fit into memory, by filters that HDF5
+/// has built in. This rules out other files (external, virtual) and whatever loads a plug-in.
 void check_storage(hid_t dataset, const DatasetRule& rule, const std::string& path) {
   const Handle creation(H5Dget_create_plist(dataset), H5Pclose, "H5Dget_create_plist");
   const H5D_layout_t layout = H5Pget_layout(creation);
@@ -118,7 +119,7 @@ void check_storage(hid_t dataset, const DatasetRule& rule, const std::string& pa
   }
 }
 
-/// The codebook is deflated, in one chunk; the others are too small to gain.
+/// Only the codebook is deflated, in one chunk; the others are too small to gain.
 Handle small_dataset_creation(const Dataset& dataset) {
   constexpr std::size_t kWorthDeflating = 4096;
   constexpr unsigned kLevel = 9;
@@ -148,7 +149,8 @@ bool fits(const std::vector<std::uint64_t>& found, const DatasetRule& rule) {
 Handle file_access() {
   Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, "H5Pcreate");
   checked(H5Pset_libver_bounds(access, H5F_LIBVER_V110, H5F_LIBVER_V110), "H5Pset_libver_bounds");
-  // A damaged object that cannot be closed must not keep its file open.
+  // Closes with the file what still is open: a damaged object that cannot be closed must not keep
+  // its file open.
   checked(H5Pset_fclose_degree(access, H5F_CLOSE_STRONG), "H5Pset_fclose_degree");
   return access;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Internal to field_file: checked calls of HDF5 and small datasets.
+// Checked calls of HDF5, and small datasets. Internal to field_file.
 #pragma once
 
 #include <filesystem>
@@ -20,7 +20,7 @@
 
 namespace af::hdf5 {
 
-/// Runs `function` and turns whatever HDF5 or a missing attribute makes of it into a FileError.
+/// Runs `function`, and turns an HDF5 failure or a missing attribute into a FileError.
 template <typename Function>
 auto naming_file(const std::filesystem::path& path, Function&& function) {
   try {
@@ -36,7 +36,7 @@ auto naming_file(const std::filesystem::path& path, Function&& function) {
   }
 }
 
-/// File access of new files: formats whose metadata carry checksums.
+/// File access for new files: formats whose metadata carry checksums.
 Handle file_access();
 Handle create_file(const std::filesystem::path& path);
 Handle open_file(const std::filesystem::path& path, unsigned flags);
@@ -48,14 +48,14 @@ std::string read_text_attribute(hid_t object, const char* name);
 void write_int_attribute(hid_t object, const char* name, int value);
 int read_int_attribute(hid_t object, const char* name);
 
-/// In-file type of an element; little-endian whatever the machine.
+/// Type of an element in the file, little-endian on any machine.
 Handle file_type(const field_layout::DatasetRule& rule);
 
 /// Writes a small dataset with its attributes units, frame, sha256; groups are made as needed.
 void write_dataset(hid_t file, const field_layout::Dataset& dataset, const std::string& sha256);
 
-/// Opens a dataset and checks type, rank and extents against the rule before anything is read;
-/// returns its true extents in `found`. Throws FileError.
+/// Opens a dataset, and checks type, rank and extents against the rule before anything is read.
+/// Returns its true extents in `found`. Throws FileError.
 Handle open_dataset(hid_t file,
                     const field_layout::DatasetRule& rule,
                     const std::string& path,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// HDF5 handles that close themselves, and checked calls. For sources of common/field alone.
+// HDF5 handles that close themselves, and checked calls. Only for sources of common/field.
 #pragma once
 
 #include <atomic>
@@ -11,7 +11,7 @@
 
 namespace af::hdf5 {
 
-/// An HDF5 call failed; the text names the call and HDF5's own reason. Callers know the file.
+/// An HDF5 call failed. The text names the call and HDF5's own reason; callers know the file.
 class CallFailed : public std::runtime_error {
  public:
   explicit CallFailed(const char* call);
@@ -50,7 +50,7 @@ class Handle {
   herr_t (*close_)(hid_t);
 };
 
-/// HDF5 prints no error stack while alive: errors travel as exceptions.
+/// While one is alive, HDF5 prints no error stack: errors travel as exceptions.
 class QuietErrors {
  public:
   QuietErrors() {
@@ -66,13 +66,13 @@ class QuietErrors {
   void* data_ = nullptr;
 };
 
-/// HDF5 takes two files in memory of one name for the same file.
+/// A new name each time, because HDF5 takes two files in memory of the same name for one file.
 inline std::string memory_name() {
   static std::atomic<std::size_t> count{0};
   return "in-memory-" + std::to_string(++count);
 }
 
-/// By how much a file in memory grows.
+/// The step by which a file in memory grows.
 inline constexpr std::size_t kMemoryStep = 1U << 16;
 
 }  // namespace af::hdf5

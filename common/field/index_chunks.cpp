@@ -15,9 +15,9 @@ namespace {
 
 constexpr int kMostDoublings = 16;
 
-/// Tiles along u that a chunk spans: whoever reads a field holds so many planes of equal u. Of few
-/// tiles, the first chunk spans the middle and its neighbours and leaves the last ones out, so that
-/// a DRR near nominal needs one of two chunks.
+/// Tiles along u that a chunk spans. Whoever reads a field holds this many planes of equal u. If
+/// there are few tiles, the first chunk spans the middle and its neighbours and leaves out the last
+/// ones, so that a DRR near nominal needs one of two chunks.
 hsize_t tiles_along_u(const std::vector<std::uint64_t>& extents) {
   constexpr std::uint64_t kMostTilesAtOnce = std::uint64_t{16} << 20;
   const std::uint64_t plane = extents[1] * extents[2] * extents[3];
@@ -26,7 +26,7 @@ hsize_t tiles_along_u(const std::vector<std::uint64_t>& extents) {
   return std::min<hsize_t>(tiles, extents[0]);
 }
 
-/// The shape after some doublings, or after fewer where it can grow no more.
+/// The shape after this many doublings, or after fewer where it cannot grow further.
 ChunkShape chunk_shape(const DatasetRule& rule, int doublings) {
   const std::vector<std::uint64_t> extents = field_layout::codewords_rule(rule).extents;
   ChunkShape shape = {tiles_along_u(extents),
@@ -40,7 +40,7 @@ ChunkShape chunk_shape(const DatasetRule& rule, int doublings) {
       shape[axis] *= 2;
       elements *= 2;
     }
-  // HDF5 takes no chunk that is larger than a dataset of fixed size.
+  // HDF5 refuses a chunk that is larger than a dataset of fixed size.
   for (std::size_t axis = 0; axis < shape.size(); ++axis)
     shape[axis] = std::min<hsize_t>(shape[axis], extents[axis]);
   return shape;

@@ -26,7 +26,7 @@ std::uint64_t position_hash(std::uint64_t position, std::uint16_t value) {
   return x ^ (x >> 31u);
 }
 
-/// With its attributes.
+/// Creates a dataset with its attributes.
 Handle create_dataset(hid_t file, const DatasetRule& rule, const ChunkShape& chunk) {
   constexpr unsigned kDeflateLevel = 6;  // 3 % smaller than 4
   const std::vector<hsize_t> extents(rule.extents.begin(), rule.extents.end());
@@ -56,9 +56,9 @@ std::uint64_t planes_of_chunk(hid_t dataset) {
   return chunk[0];
 }
 
-/// One plain hyperslab with a memory space of the same shape: collective filtered writes of unions
-/// of hyperslabs from a 1-D memory space crash or hang in HDF5 1.10.8 now and then. Nothing where
-/// `block` is null.
+/// One plain hyperslab with a memory space of the same shape. Collective filtered writes of unions
+/// of hyperslabs from a 1-D memory space sometimes crash or hang in HDF5 1.10.8. Selects nothing
+/// where `block` is null.
 struct Selection {
   Handle in_file;
   Handle in_memory;
@@ -113,7 +113,7 @@ void write(hid_t dataset, const DatasetBlock* block, std::span<const std::uint16
           "H5Dwrite");
 }
 
-/// A block of rows and of means as codewords_rule() and means_rule() have them.
+/// The rows of codewords of a block, and of means, as codewords_rule() and means_rule() have them.
 DatasetBlock codewords_of(const DatasetBlock& rows) {
   DatasetBlock block = rows;
   block.first[2] /= 2;
@@ -128,7 +128,8 @@ DatasetBlock means_of(const DatasetBlock& rows) {
 }
 
 /// Calls visit(row of codewords, row of means, first place among the means of the file). `rows`:
-/// values of a block of index_rule() with means; `places`: apart by the block's rows along s.
+/// values of a block of index_rule() with means. `places`: distance between the block's rows along
+/// s.
 template <typename Value, typename Visit>
 void for_each_row(const DatasetBlock& block, std::span<Value> rows, Visit&& visit) {
   const std::size_t along_t = block.count[3];
@@ -138,7 +139,7 @@ void for_each_row(const DatasetBlock& block, std::span<Value> rows, Visit&& visi
       visit(rows.first(along_t), rows.subspan(along_t, along_t), plane * along_s * along_t + s);
 }
 
-/// Puts rows of codewords and of means, whose differences it undoes, in turn.
+/// Interleaves rows of codewords and of means, and undoes the means' differences.
 void join(const DatasetBlock& block,
           std::span<const std::uint16_t> codewords,
           std::span<const std::uint16_t> means,

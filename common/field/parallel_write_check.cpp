@@ -22,16 +22,16 @@ namespace {
 
 /// Tiles of one viewpoint: parts of four chunks.
 constexpr std::array<int, 2> kTestTiles = {kIndexChunkTiles[0] + 2, kIndexChunkTiles[1] + 2};
-constexpr int kMostTestBlocks = 64;  ///< a megabyte, however many ranks there are
+constexpr int kMostTestBlocks = 64;  ///< a megabyte for any number of ranks
 constexpr std::size_t kTestCodewords = 256;
 /// HDF5's own metadata cache holds the index of 65536 chunks. The test goes beyond that, but not so
 /// far that it takes long.
 constexpr std::uint64_t kFewChunks = 1u << 15;
 constexpr std::uint64_t kMostTestChunks = 1u << 17;
-/// Viewpoint tiles along v, each of which begins a chunk: one block of a rank has so many.
+/// Viewpoint tiles along v, each of which begins a chunk: one block of a rank has this many.
 constexpr int kTestChunksOfBlock = 64;
 
-/// One slab, all of which is stored.
+/// A field of one slab, all of which is stored.
 CompressedAttenuationField field_of_tiles(const std::array<int, 4>& tiles) {
   CompressedAttenuationField field;
   field.identity.camera.name = "test";
@@ -60,8 +60,8 @@ IndexBlock block_to_test(const std::array<int, 4>& first_tile, const std::array<
   return block;
 }
 
-/// This rank's blocks of a field of these tiles, each of `along_u` tiles along u. The last of
-/// several ranks has none.
+/// This rank's blocks of a field of these tiles, each of `along_u` tiles along u. If there are
+/// several ranks, the last has none.
 std::vector<IndexBlock> blocks_to_test(const std::array<int, 4>& tiles,
                                        int along_u,
                                        const Communicator& communicator) {

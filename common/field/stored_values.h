@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Internal to field_file: how numbers and texts of structs become datasets, and back. No HDF5 here.
+// How numbers and texts of structs become datasets, and back. Internal to field_file, and free of
+// HDF5.
 #pragma once
 
 #include <cmath>
@@ -36,7 +37,7 @@ Dataset dataset_of(const DatasetRule& rule, std::span<const T> values) {
 
 Dataset text_dataset(const DatasetRule& rule, const std::string& text);
 
-/// FileError on NaN.
+/// Throws FileError on NaN.
 template <typename T>
 std::vector<T> values_of(const Dataset& dataset, const std::string& path) {
   check(dataset.bytes.size() % sizeof(T) == 0, "bytes of whole elements");
@@ -111,8 +112,8 @@ class StoredValues {
 void append_rules(const StoredValues& values, std::vector<DatasetRule>& rules);
 void append_datasets(const StoredValues& values, std::vector<Dataset>& datasets);
 
-/// From the first datasets; returns the others. FileError on NaN, and on infinity where it may not
-/// be.
+/// Takes values from the first datasets and returns the others. Throws FileError on NaN, and on
+/// infinity where a value must be finite.
 std::span<const Dataset> set_values(const StoredValues& values,
                                     std::span<const Dataset> datasets,
                                     const std::string& path);

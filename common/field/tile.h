@@ -24,7 +24,7 @@ inline bool is_zero(const Tile& tile) {
   return any == 0;
 }
 
-/// A tile in the coordinates of the 4-D Hadamard transform, exact. Coefficient j is the sum of the
+/// An exact tile in the coordinates of the 4-D Hadamard transform. Coefficient j is the sum of the
 /// levels, each negated if its element number shares an odd number of bits with j.
 using TileCoefficients = std::array<float, kTileElements>;
 

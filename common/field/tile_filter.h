@@ -12,22 +12,23 @@
 
 namespace af {
 
-/// Where a neighbouring tile stands: -1, 0 or 1 tiles along u, v, s and t; not 0 along at most two.
+/// Where a neighbouring tile stands: -1, 0 or 1 tiles along u, v, s and t, nonzero along at most
+/// two.
 using TileOffset = std::array<int, 4>;
 
-/// Inputs of a coefficient: its own; along each axis a sum and a difference of two neighbours;
-/// along each pair of axes a sum, two differences and a difference of differences of four.
+/// Inputs of a coefficient: its own; for each axis a sum and a difference of two neighbours; for
+/// each pair of axes a sum, two differences and a difference of differences of four.
 inline constexpr std::size_t kFilterInputs = 1 + 4 * 2 + 6 * 4;
 
-/// Linear estimate of a tile from what was decoded of it and of its 32 neighbours across at most
+/// Linear estimate of a tile from its decoded levels and those of its 32 neighbours across at most
 /// two axes, with the least mean squared error over the field (a Wiener filter; fit_tile_filter()).
-/// Smooth fields say of a tile more than its codeword does: what the codeword has lost is predicted
-/// by how its neighbours slope and bend.
+/// In a smooth field, neighbours tell what a tile's codeword has lost: how they slope and bend
+/// predicts it.
 ///
 /// It works on Hadamard coefficients, which are even or odd along each axis. Mirror symmetry leaves
-/// kFilterInputs of the 528 numbers of the neighbourhood to each coefficient: along every axis that
-/// a neighbour lies on, sums of coefficients of the same parity, or differences of those of the
-/// other. Tiles without a coefficient other than 0 are empty, and stay so.
+/// kFilterInputs of the 528 numbers of the neighbourhood to each coefficient. Along every axis
+/// where a neighbour lies, these are sums of coefficients of the same parity, or differences of
+/// coefficients of the other parity. Tiles without a nonzero coefficient are empty, and stay so.
 struct TileFilter {
   /// Added to coefficient j of a tile: the sum over i of weights[j][i] filter_inputs(j)[i].
   std::array<std::array<float, kFilterInputs>, kTileElements> weights{};
@@ -35,14 +36,15 @@ struct TileFilter {
   bool operator==(const TileFilter&) const = default;
 };
 
-/// Weights larger than this would be of no use, and sums of products with them would not be finite.
+/// Larger weights would be of no use, and sums of products with them would not be finite.
 inline constexpr float kLargestFilterWeight = 1e6f;
 
 /// Why weights cannot be used; empty when they can.
 std::vector<std::string> problems(const TileFilter& filter);
 
 /// Where a neighbour stands among tiles numbered from 0 along each axis. Beyond the viewpoints, the
-/// tiles at the edge stand for their neighbours; none beyond s and t: what is not stored is 0.
+/// tiles at the edge stand for their neighbours. There are none beyond s and t: what is not stored
+/// is 0.
 inline std::optional<std::array<int, 4>> neighbouring_tile(const std::array<int, 4>& tile,
                                                            const TileOffset& offset,
                                                            const std::array<int, 4>& counts) {
@@ -55,8 +57,7 @@ inline std::optional<std::array<int, 4>> neighbouring_tile(const std::array<int,
   return at;
 }
 
-/// The bit by which the numbers of a tile's elements and coefficients tell along an axis (0 ... 3:
-/// u, v, s, t).
+/// The bit of an element's or coefficient's number that belongs to an axis (0 ... 3: u, v, s, t).
 constexpr std::size_t axis_bit(std::size_t axis) {
   return std::size_t{8} >> axis;
 }
@@ -72,8 +73,8 @@ constexpr std::size_t pair_input(std::size_t a, std::size_t b) {
   return axis_input(4) + 4 * (kPairsBefore[a] + b - a - 1);
 }
 
-/// Inputs of coefficient j. `coefficient(offset, k)`: coefficient k of the tile there, or, with
-/// offset 0, of the tile itself, a Number.
+/// Inputs of coefficient j. `coefficient(offset, k)`, a Number, is coefficient k of the tile at
+/// `offset`, or, with offset 0, of the tile itself.
 template <typename Number, typename Coefficient>
 std::array<Number, kFilterInputs> filter_inputs(std::size_t j, Coefficient&& coefficient) {
   std::array<Number, kFilterInputs> inputs{};

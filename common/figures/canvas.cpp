@@ -35,8 +35,8 @@ std::size_t utf8_length(std::string_view text, std::size_t position) {
   return length;
 }
 
-/// Characters of a text, one string each. Bytes that are not UTF-8 (cairo would refuse the whole
-/// text) become '?'; control characters except the line feed become blanks.
+/// Characters of a text, one string each. Bytes that are not UTF-8 become '?', because cairo would
+/// refuse the whole text. Control characters except the line feed become blanks.
 std::vector<std::string> characters_of(std::string_view text) {
   std::vector<std::string> characters;
   for (std::size_t i = 0; i < text.size();) {
@@ -52,7 +52,7 @@ std::vector<std::string> characters_of(std::string_view text) {
   return characters;
 }
 
-/// Red, green and blue, row by row, of a surface that is drawn.
+/// Red, green and blue of a drawn surface, row by row.
 std::vector<png_byte> rgb_pixels(cairo_surface_t* surface) {
   const int width = cairo_image_surface_get_width(surface);
   const int height = cairo_image_surface_get_height(surface);

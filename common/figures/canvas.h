@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Internal to figures: shapes and texts on pixels, drawn by cairo.
+// Shapes and texts on pixels, drawn by cairo. Internal to figures.
 #pragma once
 
 #include <array>
@@ -41,13 +41,14 @@ class Canvas {
              const Area& area,
              const Color& color,
              double width);
-  /// Filled where `line` is 0.
+  /// A circle, filled where `line` is 0.
   void circle(double x, double y, double radius, const Color& color, double line);
   [[nodiscard]] double text_width(const std::string& text, const Font& font);
   /// `baseline_y` is where the letters stand.
   void text(
       double x, double baseline_y, const std::string& text, const Font& font, const Color& color);
-  /// Sets single pixels; `color_at(x, y)` gives 0xRRGGBB, x and y counted from the area's corner.
+  /// Sets single pixels. `color_at(x, y)` gives 0xRRGGBB, where x and y count from the area's
+  /// corner.
   void set_pixels(const Area& area, const std::function<std::uint32_t(int, int)>& color_at);
   /// The content of a PNG file.
   [[nodiscard]] std::string png();
@@ -66,8 +67,8 @@ class Canvas {
   std::unique_ptr<cairo_t, Destroy> context_;
 };
 
-/// Breaks a text into lines of at most `width` px: at blanks, inside words that are longer than a
-/// line, and at line feeds. Bytes that are not UTF-8 become '?'.
+/// Breaks a text into lines of at most `width` px: at blanks, at line feeds, and inside words that
+/// are longer than a line. Bytes that are not UTF-8 become '?'.
 std::vector<std::string> wrapped(Canvas& canvas,
                                  const std::string& text,
                                  const Font& font,

@@ -18,13 +18,13 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr std::int16_t kAirHu = -1000;
-/// Room for the coordinates about an image, px.
+/// Room for the coordinates beside an image, px.
 constexpr int kLeftPx = 46;
 constexpr int kRightPx = 18;
 constexpr int kBelowPx = 20;
 
-/// How a picture's axes lie in the patient: one of the ct axes to the right, another up or down;
-/// the viewer looks along right x down, so that nothing is mirrored.
+/// How a picture's axes lie in the patient: one of the ct axes goes right, another up or down. The
+/// viewer looks along right x down, so that nothing is mirrored.
 struct CtPlane {
   const char* name;
   const char* seen_from;
@@ -39,7 +39,7 @@ constexpr std::array kPlanes = {CtPlane{"Axial", "the feet", 0, 1, 1, 2},
                                 CtPlane{"Sagittal", "the patient's left", 1, 2, -1, 0}};
 constexpr std::array kAxisNames = {'x', 'y', 'z'};
 
-/// HU between the voxels, trilinear; air outside.
+/// Trilinear HU between the voxels; air outside.
 double hu_at(const CtVolume& ct, const Vector3d& index) {
   std::array<int, 3> low{};
   std::array<double, 3> share{};
@@ -88,7 +88,7 @@ struct CtSheet {
   [[nodiscard]] double row_of(double down_mm) const {
     return plane.down_sign * (down_mm - top_mm()) * px_per_mm - 0.5;
   }
-  /// In the panel, whose image has the coordinates' room on its left.
+  /// Place in the panel, whose image has room for the coordinates on its left.
   [[nodiscard]] std::array<double, 2> place(const Vector3d& point) const {
     return {kLeftPx + column_of(point[plane.right]), row_of(point[plane.down])};
   }
@@ -100,7 +100,7 @@ struct CtSheet {
   }
 };
 
-/// The largest of the voxels that lie nearest to points from `first` on, in indices; air outside.
+/// The largest value of the voxels nearest to points from `first` on, in indices; air outside.
 float largest_along(const CtVolume& ct, const Vector3d& first, const Vector3d& step, int count) {
   const std::span<const std::int16_t> hu = ct.hu.view();
   const auto [width, height, depth] = ct.grid.size;
@@ -119,7 +119,7 @@ float largest_along(const CtVolume& ct, const Vector3d& first, const Vector3d& s
   return static_cast<float>(largest);
 }
 
-/// Sampled by voxels, then enlarged to the sheet's pixels.
+/// Samples the largest values by voxels, then enlarges them to the sheet's pixels.
 Image2d largest_values(const CtVolume& ct, const CtSheet& sheet) {
   const double spacing = ct.grid.spacing_mm.minCoeff();
   const CtSheet coarse = {sheet.plane, sheet.shown, std::min(sheet.px_per_mm, 1.0 / spacing)};
@@ -154,7 +154,7 @@ Image2d slice_values(const CtVolume& ct, const CtSheet& sheet, double level_mm) 
   return values;
 }
 
-/// A round distance between lines, of which some six cross the longer side.
+/// A round distance between lines, such that about six cross the longer side.
 double grid_step_mm(double longest_mm) {
   for (const double step : {1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0})
     if (longest_mm / step <= 9.0) return step;
@@ -222,7 +222,7 @@ Image2d with_room(const Image2d& image) {
   return wider;
 }
 
-/// One slice, or without a level the largest values along the plane's depth.
+/// One slice or, without a level, the largest values along the plane's depth.
 PicturePanel ct_panel(const CtVolume& ct,
                       const CtMarks& marks,
                       const CtSheet& sheet,
@@ -286,7 +286,7 @@ std::vector<PicturePanel> axial_slices(const CtVolume& ct, const CtMarks& marks)
   return panels;
 }
 
-/// The three slices through each landmark, and what lies within 40 mm.
+/// The three slices through each landmark, showing what lies within 40 mm.
 std::vector<PicturePanel> landmark_slices(const CtVolume& ct, const CtMarks& marks) {
   constexpr double kHalfSideMm = 40.0;
   constexpr double kPxPerMm = 8.0;

@@ -13,19 +13,19 @@
 
 namespace af {
 
-/// What a study says of places in its CT.
+/// What a study says about places in its CT.
 struct CtMarks {
   std::optional<CtBox> target;
   std::vector<Eigen::Vector3d> landmarks_ct_mm;
 };
 
-/// The largest values along the three axes, then the slices through the middle of the target or of
-/// the CT: axial, coronal, sagittal, with a grid of ct coordinates and the patient's letters.
+/// The largest values along the three axes, then the axial, coronal and sagittal slices through the
+/// middle of the target or of the CT. All have a grid of ct coordinates and the patient's letters.
 std::vector<PicturePanel> ct_overview(const CtVolume& ct, const CtMarks& marks);
 
-/// Draws STEM-ct.png (ct_overview()), STEM-ct-axial.png (axial slices from feet to head) and, where
+/// Draws STEM-ct.png (ct_overview()), STEM-ct-axial.png (axial slices from feet to head) and, if
 /// there are landmarks, STEM-ct-landmarks.png (the three slices through each). All have a grid of
-/// ct coordinates (LPS, mm) and the patient's letters; none is mirrored: axial slices are seen from
+/// ct coordinates (LPS, mm) and the patient's letters. None is mirrored: axial slices are seen from
 /// the feet, coronal ones from the front, sagittal ones from the patient's left. Returns the files.
 std::vector<std::filesystem::path> draw_ct_pictures(const CtVolume& ct,
                                                     const CtMarks& marks,

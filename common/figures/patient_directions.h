@@ -11,7 +11,8 @@
 namespace af {
 
 /// Letters of a direction in the patient: L left, R right, A front (anterior), P back (posterior),
-/// H head, F feet; the nearest axis first, then those within 67.5 degrees of it: "A", "AR", "LPH".
+/// H head, F feet. The nearest axis comes first, then those within 67.5 degrees of the direction:
+/// "A", "AR", "LPH".
 std::string patient_letters(const Eigen::Vector3d& ct_direction);
 
 /// What stands at a picture's edges, and where the beam goes.
@@ -20,8 +21,8 @@ struct EdgeLetters {
   std::string beam_from, beam_to;
 };
 
-/// The patient's directions as a camera's picture shows them at a pose: at the left edge stand the
-/// letters of the direction against the columns, at the top of that against the rows.
+/// The patient's directions as a camera's picture shows them at a pose. The left edge has the
+/// letters of the direction against the columns, the top those of the direction against the rows.
 EdgeLetters edge_letters(const CameraGeometry& camera, const RigidTransform& room_from_ct);
 
 /// Puts them along the edges of a part of the panel's image.

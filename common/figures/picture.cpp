@@ -155,7 +155,7 @@ void draw_rimmed_text(Canvas& canvas,
   canvas.text(x, baseline_y, text, font, color_of(color));
 }
 
-/// `right` is where the panel ends: a text that would reach beyond it stands left of its mark.
+/// `right` is where the panel ends. A text that would reach beyond it is put left of its mark.
 void draw_mark(
     Canvas& canvas, const PictureMark& mark, double x, double y, double size, double right) {
   const Color color = color_of(mark.color);
@@ -296,8 +296,8 @@ void check_panels(const std::vector<PicturePanel>& panels, int columns, int zoom
   }
 }
 
-/// Refuses pictures that cairo or memory could not hold. In 64 bits, because zoomed sizes may
-/// overflow an int.
+/// Refuses pictures that cairo or memory could not hold. Computes in 64 bits, because zoomed sizes
+/// may overflow an int.
 void check_size(const std::vector<PicturePanel>& panels, int columns, int zoom) {
   constexpr std::int64_t kMaxSide = 30000;
   constexpr std::int64_t kMaxArea = 400'000'000;

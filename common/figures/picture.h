@@ -10,14 +10,14 @@
 
 namespace af {
 
-/// What is drawn over a panel's image. Places are in its pixels, integers being pixel centres.
+/// What is drawn over a panel's image. Places are in its pixels, where integers are pixel centres.
 enum class PictureColor { Ink, Yellow, Cyan, Red, Green };
 
 /// A line through points.
 struct PictureLine {
   std::vector<std::array<double, 2>> points;
   PictureColor color = PictureColor::Yellow;
-  double width_px = 1.5;  ///< of the picture
+  double width_px = 1.5;  ///< in pixels of the picture
 };
 
 /// A small mark with a text beside it.
@@ -25,7 +25,8 @@ struct PictureMark {
   enum class Shape { None, Label, Cross, Circle, Dot };
   std::array<double, 2> place = {0.0, 0.0};
   Shape shape = Shape::None;
-  std::string text;  ///< None and Label: centred on the place, in large and small letters
+  std::string
+      text;  ///< centred on the place where the mark is None or Label, in large and small letters
   PictureColor color = PictureColor::Yellow;
 };
 
@@ -46,21 +47,22 @@ struct PicturePanel {
 };
 
 /// Draws panels in a row-major grid of `columns` columns with titles, captions and the range of
-/// their window, as PNG (cairo), row 0 on top, one image pixel becoming `zoom` x `zoom` picture
-/// pixels. Values beyond the window take its end's color; values that are not finite are orange.
-/// Atomic. InputError when the picture would be larger than 30000 pixels on a side or 4e8 in all.
+/// their window, as PNG (cairo), row 0 on top. One image pixel becomes `zoom` x `zoom` picture
+/// pixels. Values beyond the window take the color of its end; values that are not finite are
+/// orange. Atomic. Throws InputError when the picture would be larger than 30000 pixels on a side
+/// or 4e8 in all.
 void write_picture(const std::vector<PicturePanel>& panels,
                    int columns,
                    const std::string& heading,
                    const std::filesystem::path& path,
                    int zoom = 1);
 
-/// Checkerboard of two images of one size, fields of `field_px` pixels, both scaled to [0, 1] by
-/// their own 1st and 99th percentile; the field at pixel (0, 0) shows `a`.
+/// Checkerboard of two images of one size, with fields of `field_px` pixels. Both are scaled to [0,
+/// 1] by their own 1st and 99th percentile. The field at pixel (0, 0) shows `a`.
 Image2d checkerboard(const Image2d& a, const Image2d& b, int field_px);
 
-/// Window (low, high) of the percentiles of an image's finite values, in its own units; (0, 0) when
-/// it has none. Between two values the percentile is interpolated.
+/// Window (low, high) between percentiles of an image's finite values, in its own units; (0, 0)
+/// when it has none. Percentiles are interpolated between values.
 std::array<double, 2> percentile_window(const Image2d& image,
                                         double low_percent = 1.0,
                                         double high_percent = 99.0);

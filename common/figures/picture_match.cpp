@@ -23,7 +23,7 @@ constexpr std::array kLayings = {
     PictureLaying{"with columns and rows swapped and turned by 180 degrees", true, true, true},
 };
 
-/// So that no side is longer than `most`.
+/// Shrinks an image until no side is longer than `most`.
 Image2d shrunk(const Image2d& image, int most) {
   return block_means(image, std::max(1, (std::max(image.width, image.height) + most - 1) / most));
 }

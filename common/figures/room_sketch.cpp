@@ -46,7 +46,7 @@ std::vector<Vector3d> closed(std::vector<Vector3d> corners) {
 
 void add_camera(const CameraGeometry& camera, RoomScene& scene) {
   const auto corners = camera.detector_corner_points();
-  // detector_corner_points() may name them in any order: around the rectangle here.
+  // detector_corner_points() may return them in any order. Here they go around the rectangle.
   const double columns = camera.size_px.x() - 0.5;
   const double rows = camera.size_px.y() - 0.5;
   const std::vector<Vector3d> around = {camera.detector_point(-0.5, -0.5),
@@ -116,7 +116,7 @@ PicturePanel panel_of(const RoomScene& scene, const Projection& projection) {
   }
   for (const RoomMark& mark : scene.marks)
     panel.marks.push_back({placed(mark.place), mark.shape, mark.text, mark.color});
-  // A source off the paper is named at its edge, on the way to it from the middle.
+  // A source off the paper is named at the edge, on the way to it from the middle.
   for (const RoomMark& source : scene.sources) {
     const auto [x, y] = placed(source.place);
     const Vector2d away = Vector2d(x, y) - Vector2d::Constant(kSide / 2.0);

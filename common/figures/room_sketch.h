@@ -11,8 +11,8 @@
 namespace af {
 
 /// Sources, detectors, the outlines of the beams and the CT's box with the patient's letters on its
-/// faces, at the scale of detectors and CT (sources may lie off the paper), along three directions:
-/// obliquely, from above the head end of the room's z axis, and along its y axis.
+/// faces, seen along three directions: obliquely, from above the head end of the room's z axis, and
+/// along its y axis. The scale is that of detectors and CT, so sources may lie off the paper.
 std::vector<PicturePanel> room_sketch(std::span<const CameraGeometry> cameras,
                                       const CtGrid& ct,
                                       const RigidTransform& room_from_ct);

@@ -29,7 +29,7 @@ struct ShownPose {
 
 /// A view's pictures, shrunk by `factor`.
 struct ShrunkView {
-  View view;  ///< of coarse pixels, the whole detector
+  View view;  ///< of coarse pixels, showing the whole detector
   int factor = 1;
 
   /// Place of a detector point in the shrunk picture.
@@ -79,14 +79,14 @@ void add_landmarks(const StudyCase& study_case,
                              PictureColor::Red});
 }
 
-/// The sides of pixels that are neither 0 on both sides nor on none, joined to lines.
+/// The sides of pixels that are 0 on one side only, joined to lines.
 std::vector<PictureLine> outline_of(const std::vector<float>& held, int width, int height) {
   std::vector<PictureLine> lines;
   const auto at = [&](int column, int row) {
     return held[static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
                 static_cast<std::size_t>(column)] != 0.0f;
   };
-  // Along one axis lines of `length` pixels, across it between neighbours.
+  // Along one axis these are lines of `length` pixels, across it they lie between neighbours.
   const auto add_lines = [&](int across, int length, const auto& differ, const auto& place) {
     for (int i = 0; i + 1 < across; ++i)
       for (int from = 0; from < length;) {
@@ -116,7 +116,7 @@ std::vector<PictureLine> outline_of(const std::vector<float>& held, int width, i
   return lines;
 }
 
-/// Where the field of a view ends at a pose; what the caption says of it.
+/// Draws where the field of a view ends at a pose. Returns what the caption says of it.
 std::string add_coverage(const std::optional<HeldRays>& field,
                          const ShrunkView& shrunk,
                          const RigidTransform& room_from_ct,
@@ -132,7 +132,7 @@ std::string add_coverage(const std::optional<HeldRays>& field,
   return "; green: limit of the rays that the field holds at this pose";
 }
 
-/// The field of a view, where it is made already; what it holds is told of.
+/// The field of a view, if it exists already. Reports which rays it holds.
 std::optional<HeldRays> field_of(const StudyCase& study_case,
                                  const StudyView& view,
                                  const CameraGeometry& camera,
@@ -152,7 +152,7 @@ std::optional<HeldRays> field_of(const StudyCase& study_case,
   return field;
 }
 
-/// The window is that of the region: borders of an X-ray may hold anything.
+/// The window is that of the region, because the borders of an X-ray may hold anything.
 PicturePanel panel_with(const Image2d& image,
                         const StudyView& view,
                         const ShrunkView& shrunk,
@@ -171,8 +171,8 @@ PicturePanel panel_with(const Image2d& image,
   return {image, window[0], window[1], title, caption, {}, {}};
 }
 
-/// The shrunk X-ray with no value, which pictures show orange, where the mask hides half of a block
-/// or more.
+/// The shrunk X-ray. Where the mask hides half of a block or more it has no value, which pictures
+/// show in orange.
 Image2d with_mask(Image2d xray, Image2d mask, int factor) {
   if (mask.pixels.empty()) return xray;
   for (float& value : mask.pixels) value = value != 0.0f ? 1.0f : 0.0f;
@@ -257,7 +257,7 @@ void draw_view(const Study& study,
   pictures.files.push_back(path);
 }
 
-/// Whether a pose moves the target by too little from its nominal place to be seen.
+/// Whether a pose moves the target from its nominal place by too little to be seen.
 bool looks_nominal(const RigidTransform& room_from_ct, const StudyCase& study_case) {
   constexpr double kUnseenMm = 0.01;
   return std::ranges::all_of(

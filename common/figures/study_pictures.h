@@ -24,18 +24,19 @@ struct StudyPictures {
   std::vector<std::string> problems;  ///< views at which a DRR is empty
 };
 
-/// What makes the DRR of a view of a camera at a pose. Each ray of the view is inside.
+/// Makes the renderer for a view of a camera. No ray of the view may be outside at the pose.
 using ViewRenderer = std::function<std::shared_ptr<const DrrRenderer>(
     const View& view, const RigidTransform& room_from_ct)>;
 
 /// Rays cast through a CT, for every view.
 ViewRenderer cast_views(const CtVolume& ct);
 
-/// Draws STEM-CAMERA.png for each view of a case (X-ray and DRRs at the nominal pose and, where the
-/// case has landmarks, at the pose that they give; patient letters at the edges, region, landmarks,
-/// the limit of the field's cover where the field exists) and STEM-room.png (sources, detectors and
-/// CT box). DRRs are those of `renderer_of`. Detectors with more than `most_pixels` on a side are
-/// shrunk. Nothing is ever flipped. Errors as of reading the X-rays and the fields.
+/// Draws STEM-CAMERA.png for each view of a case, and STEM-room.png. The former shows the X-ray and
+/// DRRs at the nominal pose and, if the case has landmarks, at the pose that they give. It also
+/// shows patient letters at the edges, the region, the landmarks, and the limit of the field's
+/// cover if the field exists. The latter shows sources, detectors and CT box. `renderer_of` makes
+/// the DRRs. Detectors with more than `most_pixels` on a side are shrunk. Nothing is ever flipped.
+/// Throws as reading the X-rays and the fields does.
 StudyPictures draw_study_pictures(const Study& study,
                                   const StudyCase& study_case,
                                   const CtGrid& ct,

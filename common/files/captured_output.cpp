@@ -14,7 +14,7 @@ namespace af {
 
 namespace {
 
-/// Up to the end: until no descriptor for writing is open any more.
+/// Reads until no descriptor for writing is open any more.
 void read_all(int descriptor, std::string& bytes) {
   std::array<char, 1 << 16> buffer{};
   for (;;) {

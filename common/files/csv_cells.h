@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rows in which every field stands beside the name of its column, and tables of them.
+// Rows in which every field stands beside the name of its column, and tables made of them.
 #pragma once
 
 #include <concepts>
@@ -53,7 +53,8 @@ inline void add_row(CsvCells cells, CsvTable& table) {
   table.add_row(std::move(fields));
 }
 
-/// `cells_of` gives the cells of each of `rows`, and the columns also where there is no row.
+/// A table of `rows`. `cells_of` gives the cells of a row, and also the columns where there is no
+/// row.
 template <std::ranges::range Rows, typename CellsOf>
 CsvTable csv_table(const Rows& rows, const CellsOf& cells_of) {
   CsvTable table(columns_of(cells_of(std::ranges::range_value_t<Rows>())));
@@ -61,7 +62,7 @@ CsvTable csv_table(const Rows& rows, const CellsOf& cells_of) {
   return table;
 }
 
-/// The columns are those of the first row; none without one.
+/// The columns are those of the first row. Without rows there are none.
 inline CsvTable csv_table(std::vector<CsvCells> rows) {
   CsvTable table(rows.empty() ? std::vector<std::string>() : columns_of(rows.front()));
   for (CsvCells& row : rows) add_row(std::move(row), table);

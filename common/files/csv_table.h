@@ -13,16 +13,18 @@
 
 namespace af {
 
-/// A CSV file with a header line, in memory; values as text. RFC 4180 quoting. Where the header has
-/// semicolons and no comma, semicolons separate fields and numbers may have a decimal comma.
+/// A CSV file with a header line, in memory, with values as text. RFC 4180 quoting. Where the
+/// header has semicolons and no comma, semicolons separate fields and numbers may have a decimal
+/// comma.
 class CsvTable {
  public:
   explicit CsvTable(std::vector<std::string> columns) : columns_(std::move(columns)) {}
-  /// FileError naming path and line when a row has the wrong number of fields, quotes are
+  /// Throws FileError naming path and line when a row has the wrong number of fields, quotes are
   /// unbalanced, a column name is repeated, a row has more than 64 MiB, or the file is empty.
   static CsvTable read(const std::filesystem::path& path);
-  /// Reads a file that is too long to be held, in tables of a few thousand rows each, in order; at
-  /// least one. FileError as read(), after the parts before the error have been received.
+  /// Reads a file that is too long for memory in tables of a few thousand rows each, in order, and
+  /// at least one table. Throws FileError as read() does, after the parts before the error have
+  /// been received.
   /// \test CsvTable.IsReadInPartsLikeAsAWhole
   static void read_in_parts(const std::filesystem::path& path,
                             const std::function<void(const CsvTable& part)>& receive);
@@ -32,7 +34,7 @@ class CsvTable {
   [[nodiscard]] const std::vector<std::string>& columns() const { return columns_; }
   [[nodiscard]] std::optional<std::size_t> find_column(std::string_view name) const;
   [[nodiscard]] const std::string& text(std::size_t row, std::string_view column) const;
-  /// FileError naming path, line, column and value when it is not a finite number.
+  /// Throws FileError naming path, line, column and value when it is not a finite number.
   [[nodiscard]] double number(std::size_t row, std::string_view column) const;
   /// The same, or NaN where it says "nan".
   [[nodiscard]] double number_or_nan(std::size_t row, std::string_view column) const;
@@ -50,19 +52,19 @@ class CsvTable {
 
   std::vector<std::string> columns_;
   std::vector<std::vector<std::string>> rows_;
-  std::vector<std::size_t> lines_;  ///< of the file, where each row begins
+  std::vector<std::size_t> lines_;  ///< line of the file where each row begins
   std::string path_;
   bool has_decimal_commas_ = false;
 };
 
-/// Writes a table of `row_count` rows, made a few thousand at a time, for tables too long to be
-/// held as text: `table_of` gives rows [first, end). The file appears when complete.
+/// Writes a table of `row_count` rows, a few thousand at a time, for tables too long to be held as
+/// text. `table_of` gives rows [first, end). The file appears only when complete.
 void write_csv_in_parts(
     const std::filesystem::path& path,
     std::size_t row_count,
     const std::function<CsvTable(std::size_t first, std::size_t end)>& table_of);
 
-/// Fixed number of decimals, for columns that people read.
+/// Text with a fixed number of decimals, for columns that people read.
 std::string fixed_text(double value, int decimals);
 
 }  // namespace af

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files of other programs' cameras and poses, which af-convert makes rig.toml, poses and study.toml
-// of.
+// Files with other programs' cameras and poses, which af-convert turns into rig.toml, poses and
+// study.toml.
 #pragma once
 
 #include <filesystem>
@@ -12,10 +12,10 @@
 
 namespace af {
 
-/// Whether the beginning of a file has the mark of another program's cameras or poses.
+/// Whether a file begins with the mark of another program's cameras or poses.
 bool has_foreign_mark(std::string_view beginning);
 
-/// "FILES: `what`: of another program's file makes it: af-convert FILES OPTIONS -o OUTPUT".
+/// "FILES: `what`; a file of another program is converted by: af-convert FILES OPTIONS -o OUTPUT".
 InputError needs_conversion(std::span<const std::filesystem::path> files,
                             const std::string& what,
                             const std::string& options,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What every reader passes before a file is opened, by us or by a library.
+// Checks that every reader makes before we or a library open a file.
 #pragma once
 
 #include <filesystem>
@@ -7,11 +7,13 @@
 
 namespace af {
 
-/// FileError unless `path` leads to a regular file, by links or not: opening a pipe waits for
-/// somebody to write into it, a device may never end, a folder is read as if it were empty.
+/// Throws FileError unless `path` leads to a regular file, through links or not. Opening a pipe
+/// waits for somebody to write into it, a device may never end, and a folder is read as if it were
+/// empty.
 void require_regular_file(const std::filesystem::path& path);
 
-/// Opens a regular file for reading its bytes. FileError when it is none or cannot be opened.
+/// Opens a regular file for reading its bytes. Throws FileError when it is none or cannot be
+/// opened.
 std::ifstream open_input_file(const std::filesystem::path& path);
 
 }  // namespace af

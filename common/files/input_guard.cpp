@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 
 using FileId = std::pair<dev_t, ino_t>;
 
-/// Of what a path leads to, links followed.
+/// Status of what a path leads to, with links followed.
 std::optional<struct stat> status_of(const fs::path& path) {
   struct stat status {};
   if (stat(path.c_str(), &status) != 0) return std::nullopt;
@@ -36,7 +36,8 @@ std::optional<FileId> id_of(const fs::path& path) {
   return status ? std::optional(id_of(*status)) : std::nullopt;
 }
 
-/// When it was written, s and ns: the number of a file that is gone is given to another.
+/// When it was written, s and ns. The inode's number alone is not enough: it is reused once a file
+/// is gone.
 using WriteTime = std::pair<time_t, long>;
 
 WriteTime write_time_of(const struct stat& status) {
@@ -49,7 +50,7 @@ fs::path canonical_path(const fs::path& path) {
   return error ? path : canonical;
 }
 
-/// Both canonical.
+/// Both paths are canonical.
 bool is_within(const fs::path& path, const fs::path& folder) {
   const fs::path relative = path.lexically_relative(folder);
   return !relative.empty() && *relative.begin() != "..";
@@ -61,7 +62,7 @@ bool is_within(const fs::path& path, const fs::path& folder) {
                    "would replace the input '" + input.string() + "': choose another name");
 }
 
-/// Of the whole process: several parts of a program read, others write.
+/// One for the whole process, because some parts of a program read and others write.
 class InputGuard {
  public:
   static InputGuard& instance() {
@@ -88,7 +89,7 @@ class InputGuard {
     const std::lock_guard lock(mutex_);
     const std::optional<FileId> id = id_of(path);
     if (!id) return;
-    // The number of an input that is gone may be another file's now.
+    // The number of an input that is gone may belong to another file now.
     if (const auto input = inputs_.find(*id); input != inputs_.end() && id_of(input->second) == id)
       refuse_output(path, input->second);
   }
@@ -114,7 +115,7 @@ class InputGuard {
     const std::lock_guard lock(mutex_);
     const auto status = status_of(path);
     if (!status) return;
-    // What had this number before is gone.
+    // The file that had this number before is gone.
     inputs_.erase(id_of(*status));
     outputs_.erase(id_of(*status));
     written_[id_of(*status)] = write_time_of(*status);

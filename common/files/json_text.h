@@ -6,9 +6,9 @@
 
 namespace af {
 
-/// The value of a JSON text from `file`. FileError naming the file when the text is not JSON, or
-/// nests deeper than 64 levels: copying, comparing and writing a value are recursive, so that deep
-/// nesting would exhaust the stack.
+/// The value of a JSON text from `file`. Throws FileError naming the file when the text is not
+/// JSON, or nests deeper than 64 levels: copying, comparing and writing a value are recursive, so
+/// deep nesting would exhaust the stack.
 /// \test JsonText.RefusesWhatIsNestedTooDeeply
 nlohmann::json json_of_text(const std::string& text, const std::string& file);
 

@@ -5,7 +5,7 @@
 
 namespace af {
 
-/// null for NaN, "inf" for infinity (which JSON lacks).
+/// null for NaN, and "inf" for infinity, because JSON has neither.
 nlohmann::json number_json(double value);
 /// The inverse; NaN for null.
 double number_of(const nlohmann::json& value);

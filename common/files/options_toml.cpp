@@ -51,7 +51,7 @@ struct TomlOfValue {
     return toml_text(value.string());
   }
 
-  /// In one line where that is short.
+  /// Lists are written on one line where that is short.
   template <typename List>
   [[nodiscard]] static std::string list(const List& values) {
     constexpr std::size_t kLongestLine = 100;
@@ -66,7 +66,7 @@ struct TomlOfValue {
   }
 };
 
-/// Name and TOML of what is recorded of a field.
+/// Name and TOML of what is recorded for a field.
 std::pair<std::string, std::string> recorded(const Field& field) {
   std::string text = std::visit(TomlOfValue{}, field.value);
   if (text.empty() && !field.name_when_unset.empty())

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What outputs record of an option struct that describes itself (base/described_fields.h).
+// What outputs record of a self-describing option struct (base/described_fields.h).
 #pragma once
 
 #include <map>
@@ -15,8 +15,8 @@ std::string toml_float(double value);
 /// TOML values of options by their names.
 using OptionTexts = std::map<std::string, std::string>;
 
-/// Lines "name = value" of the recorded fields, in the order of the description; of fields that
-/// were not given, nothing. Numbers read back to the same bits.
+/// Lines "name = value" of the recorded fields, in the order of the description. Fields that were
+/// not given are left out. Numbers read back to the same bits.
 std::string toml_of_fields(const Fields& fields);
 
 /// The fields that decide results, or one stage of them.
@@ -38,16 +38,16 @@ std::string to_toml(const T& options) {
   return toml_of_fields(fields_of(in_force));
 }
 
-/// Name and TOML value of every option in force that decides results, or `stage` of them: what
-/// unfinished work is valid for. Inputs are left out: their contents decide.
+/// Name and TOML value of every option in force that decides results, or that decides `stage` of
+/// them. Unfinished work is valid for these. Inputs are left out, because their contents decide.
 template <Described T>
 OptionTexts deciding_options(const T& options, const std::string& stage = "") {
   T in_force = options_in_force(options);
   return deciding_fields(fields_of(in_force), stage);
 }
 
-/// The values of a text of "name = value" lines; a list may go on over several. Comments are left
-/// out.
+/// The values in a text of "name = value" lines. A list may continue over several lines. Comments
+/// are left out.
 OptionTexts option_texts(const std::string& toml);
 
 }  // namespace af

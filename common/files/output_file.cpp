@@ -28,7 +28,7 @@ std::string because(const std::string& what, int error_number) {
   return what + ": " + std::generic_category().message(error_number);
 }
 
-/// An open file descriptor. close() reports errors, the destructor cannot.
+/// An open file descriptor. close() reports errors, which the destructor cannot.
 class Descriptor {
  public:
   Descriptor(const fs::path& path, int flags, mode_t mode = 0)
@@ -58,7 +58,7 @@ class Descriptor {
     }
   }
   void flush_to_disk() const {
-    // Some file systems cannot sync a folder and say EINVAL: nothing more can be done there.
+    // Some file systems cannot sync a folder and report EINVAL. Nothing more can be done there.
     if (fsync(number_) != 0 && errno != EINVAL)
       throw FileError(path_, because("cannot be synced to disk", errno));
   }
@@ -87,10 +87,10 @@ fs::path partial_path(const fs::path& path) {
   return path.parent_path() / (stem.string() + ".partial" + extension);
 }
 
-/// What a rename or a removal would destroy.
+/// Refuses what a rename or a removal would destroy.
 void check_may_be_replaced(const fs::path& path) {
   std::error_code ignored;
-  // A rename would put a plain file in the place of a folder or of a device such as /dev/null.
+  // A rename would replace a folder, or a device such as /dev/null, by a plain file.
   if (fs::exists(path, ignored) && !fs::is_regular_file(path, ignored))
     throw FileError(path.string(), "exists and is not a regular file");
   if (!fs::exists(path, ignored) && fs::is_symlink(path, ignored))
@@ -110,7 +110,7 @@ void write_and_rename(const fs::path& path,
   move_into_place(partial, path);
 }
 
-/// write_atomically() of what `write` writes.
+/// write_atomically() by way of `write`.
 void write_new_file(const fs::path& path, const std::function<void(const Descriptor&)>& write) {
   write_atomically(path, [&](const fs::path& partial) {
     constexpr mode_t kMode = 0666;  // before the umask
@@ -195,7 +195,7 @@ void write_atomically(const std::filesystem::path& path,
   remove_partial();
   try {
     write_and_rename(path, partial, write);
-  } catch (const std::system_error& error) {  // of std::filesystem and of streams
+  } catch (const std::system_error& error) {  // from std::filesystem and streams
     remove_partial();
     throw FileError(path.string(), std::string("cannot be written: ") + error.what());
   } catch (...) {

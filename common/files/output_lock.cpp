@@ -43,7 +43,7 @@ std::string time_text() {
   return text.data();
 }
 
-/// The parts of a lock's text by which its holder is known again.
+/// The parts of a lock's text that identify its holder.
 std::string on_this_host() {
   return " on " + host_name() + ",";
 }
@@ -58,8 +58,8 @@ std::string this_process() {
          time_text();
 }
 
-/// The text of a lock, as a message may show it, since another user may have written the file.
-/// Empty when nobody has written into it yet.
+/// The text of a lock, made safe for messages, since another user may have written the file. Empty
+/// when nobody has written into it yet.
 std::string holder_of(const fs::path& path) {
   constexpr std::size_t kLongest = 1000;
   std::string text(kLongest, '\0');
@@ -72,7 +72,7 @@ std::string holder_of(const fs::path& path) {
   return text;
 }
 
-/// Whether a lock that nobody holds was left by a process that has surely ended.
+/// Whether a lock that nobody holds was left by a process that has certainly ended.
 bool is_of_ended_process(const std::string& holder) {
   if (holder.empty()) return true;
   const std::string job = of_this_job();
@@ -94,7 +94,7 @@ Locked lock_by_kernel(int descriptor, const fs::path& path) {
   throw FileError(path.string(), "cannot be locked: " + std::generic_category().message(errno));
 }
 
-/// Whether the open file is still the one of that name: its holder removes it when done.
+/// Whether the open file still has that name: its holder removes it when done.
 bool is_current(int descriptor, const fs::path& path) {
   struct stat open_file {};
   struct stat named {};
@@ -113,7 +113,7 @@ void write_text(int descriptor, const std::string& text, const fs::path& path) {
   throw FileError(path.string(), "cannot be written: " + reason);
 }
 
-/// FileError when something else has the name of the lock.
+/// Throws FileError when something else has the name of the lock.
 void require_lock_is_a_file(const fs::path& path) {
   struct stat named {};
   if (lstat(path.c_str(), &named) == 0 && !S_ISREG(named.st_mode))
@@ -148,7 +148,8 @@ void require_lock_is_a_file(const fs::path& path) {
 class OwnLocks {
  public:
   static OwnLocks& instance() {
-    static auto* const locks = new OwnLocks;  // outlives every lock, of other statics, too
+    static auto* const locks =
+        new OwnLocks;  // outlives every lock, including those of other statics
     return *locks;
   }
 
@@ -214,7 +215,7 @@ bool OutputLock::try_to_take(const fs::path& output) {
 
 bool OutputLock::open_file() {
   constexpr mode_t kMode = 0666;  // before the umask
-  // Whatever has taken the name of the lock must not be followed, waited for or become a terminal.
+  // Whatever has taken the name of the lock must not be followed, waited for or made a terminal.
   constexpr int kFlags = O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY;
   while (true) {
     descriptor_ = ::open(path_.c_str(), kFlags | O_CREAT | O_EXCL, kMode);
@@ -223,7 +224,7 @@ bool OutputLock::open_file() {
       require_lock_is_a_file(path_);
       descriptor_ = ::open(path_.c_str(), kFlags);
       if (descriptor_ >= 0) return false;
-      if (errno == ENOENT) continue;  // removed in between: once more
+      if (errno == ENOENT) continue;  // removed in between: try again
     }
     const std::string reason = std::generic_category().message(errno);
     const std::string holder = holder_of(path_);
@@ -237,7 +238,7 @@ OutputLock::~OutputLock() {
   if (descriptor_ < 0) return;
   if (!output_.empty()) {
     OwnLocks::instance().remove(output_);
-    // If somebody removed the file meanwhile, another job may have made it anew.
+    // If somebody removed the file meanwhile, another job may have created it again.
     if (is_current(descriptor_, path_)) ::unlink(path_.c_str());
   }
   ::close(descriptor_);

@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Locks a folder beside which the lock can stand.
+/// Locks a folder that has a parent in which the lock can stand.
 OutputLock locked(const fs::path& folder) {
   make_folder(folder.parent_path());
   return OutputLock(folder);
@@ -23,7 +23,8 @@ fs::path with_suffix(const fs::path& folder, const std::string& suffix) {
   return folder.parent_path() / (folder.filename().string() + suffix);
 }
 
-/// Absolute, without "." or a trailing slash, so that a suffix joins the folder's name.
+/// Absolute, and without "." or a trailing slash, so that a suffix can be appended to the folder's
+/// name.
 fs::path normal_folder(const fs::path& folder) {
   fs::path normal = fs::absolute(folder).lexically_normal();
   if (!normal.has_filename()) normal = normal.parent_path();

@@ -5,7 +5,7 @@
 
 namespace af {
 
-/// A lock to hold while a thread reads files by HDF5, ITK or GDCM and other threads may do so, too:
+/// A lock to hold while a thread reads files by HDF5, ITK or GDCM and other threads may do so too:
 /// these libraries are single-threaded. Its holder must not wait for a thread that may want it.
 class ReadingTurn {
  public:
@@ -24,7 +24,7 @@ class ReadingTurn {
     static ForkAwareMutex one;
     return one;
   }
-  /// Of this thread: a reader may use another one.
+  /// Depth in this thread: a reader may use another one.
   static int& depth() {
     thread_local int turns = 0;
     return turns;

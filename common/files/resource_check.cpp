@@ -30,7 +30,7 @@ std::string size_text(double bytes) {
   return text.str();
 }
 
-/// Without paging; without limit where the system does not tell.
+/// Memory without paging. Infinite where the system does not tell.
 double available_memory_bytes() {
   double available = std::numeric_limits<double>::infinity();
   std::ifstream file("/proc/meminfo");

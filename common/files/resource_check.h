@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks before the work whether disk and memory suffice for it.
+// Checks before the work whether disk and memory suffice.
 #pragma once
 
 #include <cstdint>
@@ -8,10 +8,11 @@
 
 namespace af {
 
-/// InputError when a new file of `bytes` at `path` does not fit on its file system now.
+/// Throws InputError when a new file of `bytes` at `path` does not fit on its file system now.
 void require_disk_space(const std::filesystem::path& path, double bytes);
 
-/// InputError, naming `what` asks for it, when this machine does not have `bytes` of memory left.
+/// Throws InputError, naming `what` asks for it, when this machine does not have `bytes` of memory
+/// left.
 void require_memory(const std::string& what, double bytes);
 
 }  // namespace af

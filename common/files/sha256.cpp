@@ -68,7 +68,7 @@ std::string sha256_of_file(const std::string& path) {
     file.read(buffer.data(), static_cast<std::streamsize>(buffer.size()));
     hash.update(std::as_bytes(std::span(buffer).first(static_cast<std::size_t>(file.gcount()))));
   }
-  // A plain end of file sets no badbit.
+  // Reaching the end of the file does not set badbit.
   if (file.bad()) throw FileError(path, std::string("cannot be read: ") + strerror(errno));
   return hash.hex_digest();
 }

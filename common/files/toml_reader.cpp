@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::size_t kLongestKey = 64;  // in messages
 
-/// toml++ bounds the nesting of values, but not that of dotted keys, and walks tables recursively.
+/// toml++ limits the nesting of values, but not of dotted keys, and walks tables recursively.
 void check_key_depth(std::string_view text, const std::string& file) {
   constexpr int kMaxDots = 256;
   constexpr std::string_view kEndsKey = ",[]{}=\n#";
@@ -36,7 +36,7 @@ std::string line_and_column(const toml::source_position& position) {
   return std::to_string(position.line) + ":" + std::to_string(position.column);
 }
 
-/// Appends a value as TOML on one line; stops at the length at which messages are cut.
+/// Appends a value as TOML on one line. Stops at the length at which messages are cut.
 void append_value(std::string& text, const toml::node& node) {
   constexpr std::size_t kLongEnough = 200;
   if (text.size() > kLongEnough) return;
@@ -78,7 +78,7 @@ std::optional<double> number_within(const toml::node& node, double most) {
   return value;
 }
 
-/// The numbers of a list of `count` numbers that are not beyond `most`; nullopt for anything else.
+/// The numbers of a list of `count` numbers within `most`; nullopt for anything else.
 std::optional<std::vector<double>> numbers_within(const toml::node& node, int count, double most) {
   const toml::array* list = node.as_array();
   if (list == nullptr || list->size() != static_cast<std::size_t>(count)) return std::nullopt;
@@ -91,7 +91,7 @@ std::optional<std::vector<double>> numbers_within(const toml::node& node, int co
   return numbers;
 }
 
-/// [] or as many NaNs as there are columns.
+/// Whether a row is [], or as many NaNs as there are columns.
 bool is_absent_row(const toml::node& node, int columns) {
   const toml::array* list = node.as_array();
   if (list == nullptr) return false;

@@ -17,15 +17,15 @@
 // Internal to common/io: toml++ stays out of every public header.
 namespace af {
 
-/// Parses TOML. FileError "FILE:LINE:COLUMN: reason" when it is not TOML; also for an empty text
-/// and for keys nested so deeply that handling them would exhaust the stack.
+/// Parses TOML. Throws FileError "FILE:LINE:COLUMN: reason" when it is not TOML, when the text is
+/// empty, and when keys are nested so deeply that handling them would exhaust the stack.
 toml::table parse_toml(std::string_view text, const std::string& file);
 constexpr std::size_t kMostTomlBytes = std::size_t{64} << 20;
 
-/// parse_toml() of a file of at most kMostTomlBytes.
+/// parse_toml() for a file of at most kMostTomlBytes.
 toml::table read_toml_file(const std::filesystem::path& path);
 
-/// Collects everything wrong with one file, so that all of it is reported at once.
+/// Collects everything wrong with one file, so that it is reported all at once.
 class TomlProblems {
  public:
   explicit TomlProblems(std::string file) : file_(std::move(file)) {}
@@ -34,7 +34,7 @@ class TomlProblems {
   void add(const toml::node& node, const std::string& message);
   [[nodiscard]] std::string where(const toml::node& node) const;
   [[nodiscard]] bool empty() const { return problems_.empty(); }
-  /// InputError that lists every problem in the order of the file's lines, or nothing.
+  /// Throws InputError that lists every problem in the order of the file's lines, if there is any.
   void throw_if_any() const;
 
  private:
@@ -51,12 +51,12 @@ enum class Presence { Required, Optional };
 /// Whether rows of a matrix may be absent.
 enum class RowGaps { Refused, Allowed };
 
-/// Reads one table's keys with type and range checks. Every get_*() notes its key as known; a value
+/// Reads one table's keys with type and range checks. Every get_*() notes its key as known. A value
 /// that is missing or unacceptable is noted as a problem and comes back as nullopt.
 class TomlTableReader {
  public:
-  /// `prefix` stands before key names in messages: "case[0]." or empty. Table and problems must
-  /// outlive the reader.
+  /// `prefix` precedes key names in messages: "case[0]." or empty. Table and problems must outlive
+  /// the reader.
   TomlTableReader(const toml::table& table, std::string prefix, TomlProblems& problems)
       : table_(table), prefix_(std::move(prefix)), problems_(problems) {}
 
@@ -72,13 +72,13 @@ class TomlTableReader {
     if (!numbers) return std::nullopt;
     return Eigen::Map<const Eigen::Matrix<double, Size, 1>>(numbers->data());
   }
-  /// A list of as many numbers as there are, within kMaxRoomMm; an empty one is a problem.
+  /// A list of any number of numbers within kMaxRoomMm. An empty one is a problem.
   std::optional<std::vector<double>> get_number_list(const char* key, Presence presence);
   /// A list of exactly `count` whole numbers that fit an int.
   std::optional<std::vector<int>> get_integers(const char* key, int count, Presence presence);
-  /// A list of rows of `columns` numbers each, finite and not beyond `most`; `rows` = -1: any
-  /// number of rows. With `RowGaps::Allowed` a row may be absent: `[]`, or `nan` in every column;
-  /// it is then NaN.
+  /// A list of rows of `columns` numbers each, finite and within `most`. `rows` = -1: any number of
+  /// rows. With `RowGaps::Allowed` a row may be absent, given as `[]` or as `nan` in every column.
+  /// It is then NaN.
   std::optional<Eigen::MatrixXd> get_matrix(const char* key,
                                             int rows,
                                             int columns,
@@ -90,9 +90,9 @@ class TomlTableReader {
   /// The tables of [[key]]; none is a problem when the key is required.
   std::vector<const toml::table*> get_tables(const char* key, Presence presence);
 
-  /// The value of a key, or the table itself when it is not there.
+  /// The value of a key, or the table itself when the key is not there.
   [[nodiscard]] const toml::node& node(const char* key) const;
-  /// Whether the key is there; makes it a known one.
+  /// Whether the key is there. Notes it as known.
   bool has(const char* key);
   /// Whether the key is there and holds a number.
   bool has_number(const char* key);

@@ -21,8 +21,8 @@ namespace {
 constexpr std::size_t kChecksumDigits = 64;
 constexpr std::size_t kMostBytes = 64u << 20;
 
-/// A folder named by the environment; as the XDG Base Directory Specification asks, a relative path
-/// counts as none.
+/// A folder named by the environment. A relative path counts as none, as the XDG Base Directory
+/// Specification asks.
 fs::path folder_in(const char* variable) {
   const char* const value = std::getenv(variable);
   const fs::path folder = value == nullptr ? "" : value;
@@ -39,7 +39,7 @@ fs::path entry_of(const std::string& key) {
   return caches / "attenuation-fields" / key;
 }
 
-/// Nobody else may have written what is read, or learns from it which CTs there are.
+/// Nobody else may have written what is read, or may learn from it which CTs there are.
 void require_private(const fs::path& folder) {
   struct stat found {};
   constexpr mode_t kOthers = S_IRWXG | S_IRWXO;
@@ -48,7 +48,7 @@ void require_private(const fs::path& folder) {
     throw FileError(folder.string(), "is not this user's alone");
 }
 
-/// Of an entry that is whole and of this key.
+/// Checksum of an entry, which shows that it is whole and belongs to this key.
 std::string checksum(std::string_view key, std::string_view content) {
   Sha256 hash;
   for (const std::string_view part : {key, content}) hash.update(std::as_bytes(std::span(part)));

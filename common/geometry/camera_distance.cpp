@@ -11,7 +11,7 @@ namespace af {
 
 namespace {
 
-/// Files of cameras and of fields state geometry to less than this.
+/// Files state the geometry of cameras and fields less precisely than this.
 constexpr double kSameMm = 1e-3;
 
 RigidTransform room_from_camera(const CameraGeometry& camera) {

@@ -11,8 +11,8 @@ namespace af {
 struct CameraDistance {
   double source_mm = 0.0;           ///< between the sources
   double rotation_deg = 0.0;        ///< between the detectors' axes, about any axis
-  double source_detector_mm = 0.0;  ///< distance of source and detector: this one's less nominal
-  double detector_mm = 0.0;         ///< largest distance between corners of the same number
+  double source_detector_mm = 0.0;  ///< source-detector distance: this camera's minus the nominal
+  double detector_mm = 0.0;         ///< largest distance between corresponding corners
   bool has_other_pixels = false;    ///< another size or spacing
 
   /// Whether all rays are the same: no point differs by more than 1e-3 mm.

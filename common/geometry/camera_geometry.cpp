@@ -25,9 +25,9 @@ std::string text_of(const Vector& vector) {
   return out.str();
 }
 
-/// K and R of M = K R with K upper triangular with positive diagonal (RQ decomposition:
-/// Gram-Schmidt from the last row on; Hartley and Zisserman, Multiple View Geometry, 2nd
-/// ed., 6.2.4). M has an inverse.
+/// K and R of an invertible M = K R, where K is upper triangular with a positive diagonal. This is
+/// the RQ decomposition: Gram-Schmidt from the last row on (Hartley and Zisserman, Multiple View
+/// Geometry, 2nd ed., 6.2.4).
 struct RqFactors {
   Eigen::Matrix3d intrinsics;
   Eigen::Matrix3d camera_from_room;
@@ -36,7 +36,7 @@ struct RqFactors {
 RqFactors rq_decomposition(const Eigen::Matrix3d& matrix) {
   const Eigen::Vector3d z = matrix.row(2).normalized();
   Eigen::Vector3d y = matrix.row(1).transpose() - matrix.row(1).dot(z) * z;
-  y -= y.dot(z) * z;  // what rounding left of z, should the rows be nearly parallel
+  y -= y.dot(z) * z;  // rounding leaves a part along z when rows are nearly parallel
   y.normalize();
   Eigen::Vector3d x = y.cross(z).normalized();
   if (matrix.row(0).dot(x) < 0.0) x = -x;
@@ -120,8 +120,7 @@ CameraGeometry CameraGeometry::from_projection_matrix(
   factors.intrinsics /= factors.intrinsics(2, 2);
   const double focal_column_px = factors.intrinsics(0, 0);
   const double focal_row_px = factors.intrinsics(1, 1);
-  // The depth direction of the camera must be the direction of growing w; RQ keeps it, since K(2,2)
-  // > 0.
+  // The camera's depth must grow where w grows. RQ keeps that direction, since K(2,2) > 0.
   const Eigen::Vector3d depth_direction = factors.camera_from_room.row(2);
   constexpr double kSkewTolerance = 1e-6;
   if (std::abs(factors.intrinsics(0, 1)) > kSkewTolerance * focal_column_px)
@@ -143,7 +142,7 @@ CameraGeometry CameraGeometry::from_projection_matrix(
   camera.source_point = -left.inverse() * projection.col(3);
   camera.column_direction = factors.camera_from_room.row(0);
   camera.row_direction = factors.camera_from_room.row(1);
-  // The stated spacings fix the detector's distance; their ratio is corrected to the matrix, which
+  // The stated spacings fix the detector's distance. Their ratio follows the matrix, because that
   // is the calibration.
   camera.pixel_spacing_mm = {pixel_spacing_mm.x(), distance_column_mm / focal_row_px};
   camera.detector_origin_point =

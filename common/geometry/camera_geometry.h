@@ -28,8 +28,8 @@ struct CameraGeometry {
   Eigen::Vector3d row_direction = Eigen::Vector3d::UnitY();         ///< of increasing row
   Eigen::Vector2d pixel_spacing_mm = Eigen::Vector2d::Ones();       ///< column, row
   Eigen::Vector2i size_px = Eigen::Vector2i::Zero();                ///< columns, rows
-  /// Of the stored X-rays: they are undistorted on reading, and everything here is of the
-  /// undistorted ones.
+  /// The lens that distorted the stored X-rays. Reading undistorts them, so everything else here
+  /// describes undistorted images.
   LensDistortion distortion;
 
   auto members() {
@@ -45,7 +45,7 @@ struct CameraGeometry {
 
   [[nodiscard]] Eigen::Vector3d detector_point(double column, double row) const;
   [[nodiscard]] Ray ray(double column, double row) const;
-  /// (column, row) where the ray from the source through a room point meets the detector plane; the
+  /// (column, row) where the ray from the source through a room point meets the detector plane. The
   /// point must lie on the detector's side of the source.
   [[nodiscard]] Eigen::Vector2d project(const Eigen::Vector3d& room_point) const;
   /// Unit normal of the detector plane that points from source to detector.
@@ -57,7 +57,7 @@ struct CameraGeometry {
   /// Detector pixels per millimetre on the plane through `room_point` parallel to the detector
   /// (mean spacing of columns and rows).
   [[nodiscard]] double pixels_per_mm(const Eigen::Vector3d& room_point) const;
-  /// True when column x row points against the beam: images then appear mirrored.
+  /// True when column x row points against the beam. Images then appear mirrored.
   [[nodiscard]] bool is_mirrored() const;
   /// The four outer corners of the detector (room, mm).
   [[nodiscard]] std::array<Eigen::Vector3d, 4> detector_corner_points() const;
@@ -84,7 +84,7 @@ struct CameraRig {
 
   auto members() { return std::tie(isocenter_point, cameras); }
 
-  /// The camera of that name, or the only one whose name differs just in the case of letters.
+  /// The camera of that name, or the only one whose name differs just in upper and lower case.
   /// Throws InputError that lists the known names.
   [[nodiscard]] const CameraGeometry& camera(const std::string& name) const;
 };

@@ -33,20 +33,20 @@ struct CtGrid {
   }
 };
 
-/// Places that lie no farther apart are one: the files of one CT differ in the last digits of its
-/// grid.
+/// Places no farther apart than this count as one: files of the same CT differ in the last digits
+/// of its grid.
 inline constexpr double kSamePlaceMm = 1e-3;
 
 bool is_same_place(const Eigen::Vector3d& a_mm, const Eigen::Vector3d& b_mm);
 
-/// The centres of the voxels in the corners, that of (0, 0, 0) first, the opposite one last.
+/// The centres of the corner voxels: (0, 0, 0) first, the opposite corner last.
 std::array<Eigen::Vector3d, 8> corners_mm(const CtGrid& grid);
 
-/// Of two grids of one size: the corner whose places lie farthest apart, as an index of
+/// The corner whose places lie farthest apart in two grids of one size, as an index of
 /// corners_mm().
 std::size_t farthest_corner(const CtGrid& a, const CtGrid& b);
 
-/// The largest distance between the places that two grids of one size give to a corner's voxel.
+/// The largest distance between the places that two grids of one size give to a corner voxel.
 double largest_corner_shift_mm(const CtGrid& a, const CtGrid& b);
 
 }  // namespace af

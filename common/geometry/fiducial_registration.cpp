@@ -17,12 +17,12 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// The smallest eigenvalue of sum(I - d d^T) for two rays at angle a is 1 - cos(a): 1 degree, to
-// second order.
+// For two rays at angle a, the smallest eigenvalue of sum(I - d d^T) is 1 - cos(a). This is its
+// value at 1 degree, to second order.
 constexpr double kSmallestRayEigenvalue = kRadPerDeg * kRadPerDeg / 2.0;
 
-// Points spread less than this share of their length across a line count as collinear: a rotation
-// about that line would be decided by rounding or detection noise.
+// Points count as collinear when they spread across a line by less than this share of their length.
+// Rounding or detection noise would then decide the rotation about that line.
 constexpr double kCollinearRatio = 1e-3;
 
 Matrix3d across(const Ray& ray) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The nodes of a field as integers: all that training, encoding, planning, progress and the layout
-// of files need. The field's geometry knows where nodes lie and which rays they are.
+// The nodes of a field as integers, which is all that training, encoding, planning, progress and
+// file layout need. The field's geometry knows where nodes lie and which rays they are.
 #pragma once
 
 #include <array>
@@ -23,8 +23,8 @@ struct NodeRange {
 /// One axis of a slab's lattice.
 struct LatticeAxis {
   int nodes = 0;  ///< of the whole lattice
-  /// The stored nodes; all others are exactly 0. The range begins at an even node, and its count is
-  /// odd only where it ends at the last node.
+  /// The stored nodes; all others are exactly 0. The range begins at an even node. Its count is odd
+  /// only where it ends at the last node.
   NodeRange stored;
 };
 
@@ -56,10 +56,10 @@ struct FieldLattice {
   [[nodiscard]] std::int64_t node_count() const;  ///< of the whole lattices
 };
 
-/// Most nodes along an axis: tiles along four such axes can be counted.
+/// Most nodes along an axis, so that the tiles along four such axes can be counted.
 inline constexpr int kMaxNodes = 65536;
 
-/// Why the numbers cannot be a slab's; empty when they can. `name` is the slab's in messages.
+/// Why the numbers cannot be a slab's; empty when they can. Messages call the slab `name`.
 std::vector<std::string> problems(const SlabLattice& slab, const std::string& name);
 
 }  // namespace af

@@ -20,8 +20,8 @@ using Eigen::Vector3d;
 constexpr std::uint64_t kGoldStream = 0x676F6C64;  // "gold"
 constexpr std::size_t kPoseParameters = 6;
 
-/// The views in which the gold pose itself would show the fiducials; hidden where the views hide
-/// them, and where one view alone shows them.
+/// The fiducials as the gold pose itself projects them. Hidden stay those that a view hides, and
+/// those that only one view shows.
 std::vector<FiducialView> projected_views(const FiducialGold& gold,
                                           std::span<const FiducialView> views,
                                           std::span<const Vector3d> fiducials_ct_mm) {
@@ -37,7 +37,7 @@ std::vector<FiducialView> projected_views(const FiducialGold& gold,
   return projected;
 }
 
-/// Distances of what was seen from the projections.
+/// Distances between the detections and the projections.
 struct PixelResiduals {
   double squares_px2 = 0.0;
   std::size_t detections = 0;
@@ -56,7 +56,7 @@ PixelResiduals pixel_residuals(std::span<const FiducialView> seen,
   return residuals;
 }
 
-/// TRE between the gold pose and that of one set of noisy detections.
+/// TRE between the gold pose and the pose from one set of noisy detections.
 double replicate_tre_mm(const FiducialGold& gold,
                         std::vector<FiducialView> views,
                         std::span<const Vector3d> fiducials_ct_mm,

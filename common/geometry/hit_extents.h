@@ -8,7 +8,8 @@
 
 namespace af {
 
-/// As extents_on_planes(), without the margin: what planes must hold, not how large they are made.
+/// Like extents_on_planes(), without the margin: what planes must hold, not how large they are
+/// made.
 std::vector<PlaneExtent> hit_extents(const CameraGeometry& camera,
                                      const PoseFrame& frame,
                                      const MotionRange& range,

@@ -32,7 +32,7 @@ struct Sighting {
 
 struct Candidate {
   RigidTransform room_from_ct = RigidTransform::Identity();
-  double cost_mm2 = std::numeric_limits<double>::infinity();  ///< of the detectors
+  double cost_mm2 = std::numeric_limits<double>::infinity();  ///< on the detectors
 };
 
 std::vector<Sighting> sightings_of(std::span<const LandmarkView> views,
@@ -68,14 +68,14 @@ void require_enough(const std::vector<Sighting>& sightings) {
   const Vector3d extent =
       Eigen::JacobiSVD<Matrix3d, Eigen::NoQRPreconditioner>(centered * centered.transpose())
           .singularValues();
-  // Of the second largest extent against the largest, as variances.
+  // The second largest extent relative to the largest, as variances.
   constexpr double kLeastWidth = 0.02;
   if (!(extent[1] > kLeastWidth * kLeastWidth * extent[0]))
     throw InputError("landmarks_ct_mm", "on one line", "must fix a rotation about any axis");
 }
 
-/// Detector millimetres between where a point is projected and where it was seen; nullopt when it
-/// is not before the source.
+/// Distance (mm, on the detector) between a point's projection and where it was seen; nullopt when
+/// the point is not in front of the source.
 std::optional<Vector2d> miss_mm(const Sighting& sighting, const RigidTransform& room_from_ct) {
   const Vector3d room_point = room_from_ct * sighting.ct_point;
   constexpr double kLeastDepthMm = 1.0;
@@ -94,14 +94,14 @@ double cost_mm2(const std::vector<Sighting>& sightings, const RigidTransform& ro
   return cost;
 }
 
-/// The pose turned about the landmarks' middle and moved: steps of radians and of millimetres.
+/// The pose turned about the landmarks' middle, then moved: steps in radians and millimetres.
 RigidTransform stepped(const RigidTransform& pose, const Vector3d& middle, const Vector6d& step) {
   const PoseFrame frame = PoseFrame::about(pose, middle);
   return pose_from_parameters(frame, {step.head<3>(), step.tail<3>()});
 }
 
-/// Normal equations of the misses about a pose, by central differences: a few points, six
-/// parameters.
+/// Normal equations of the misses about a pose. Central differences are cheap enough: a few points,
+/// six parameters.
 struct NormalEquations {
   Matrix6d hessian = Matrix6d::Zero();
   Vector6d gradient = Vector6d::Zero();
@@ -171,7 +171,7 @@ Candidate refined(const std::vector<Sighting>& sightings,
   return best;
 }
 
-/// The pose of a rotation whose translation brings the points nearest to their rays.
+/// The pose with this rotation whose translation brings the points nearest to their rays.
 RigidTransform nearest_to_rays(const std::vector<Sighting>& sightings, const Matrix3d& rotation) {
   Matrix3d sum = Matrix3d::Zero();
   Vector3d right = Vector3d::Zero();
@@ -207,7 +207,7 @@ std::vector<Matrix3d> rotations_over_all() {
   return all;
 }
 
-/// Fitted to the triangulated landmarks, where three of them are seen twice.
+/// The pose fitted to the triangulated landmarks, where two or more views show three of them.
 std::optional<RigidTransform> triangulated_pose(const std::vector<Sighting>& sightings,
                                                 std::size_t landmark_count) {
   std::vector<Vector3d> room_points;
@@ -235,7 +235,7 @@ std::optional<RigidTransform> triangulated_pose(const std::vector<Sighting>& sig
   }
 }
 
-/// Poses that differ, the best first.
+/// Poses that differ from each other, the best first.
 std::vector<Candidate> different_candidates(std::vector<Candidate> all) {
   std::ranges::stable_sort(
       all, [](const Candidate& a, const Candidate& b) { return a.cost_mm2 < b.cost_mm2; });
@@ -251,8 +251,8 @@ std::vector<Candidate> different_candidates(std::vector<Candidate> all) {
   return kept;
 }
 
-/// Those that fit about as well as the best: misses of up to half a millimetre more on the
-/// detector, or a fifth more, RMS, may be how the landmarks were clicked.
+/// The candidates that fit about as well as the best. The way landmarks were clicked can explain
+/// RMS misses of half a millimetre more on the detector, or a fifth more.
 std::vector<Candidate> about_as_good(const std::vector<Candidate>& candidates,
                                      std::size_t sighting_count) {
   const auto rms_mm = [&](const Candidate& candidate) {

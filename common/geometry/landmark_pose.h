@@ -19,12 +19,12 @@ struct LandmarkView {
   std::vector<std::optional<Eigen::Vector2d>> landmarks_px;
 };
 
-/// How far a placed landmark is from where one view saw it.
+/// How far a placed landmark lies from where one view saw it.
 struct LandmarkResidual {
   std::size_t landmark = 0;  ///< index
   std::size_t view = 0;      ///< index
-  double px = 0.0;           ///< on the detector, in its pixels (columns and rows by themselves)
-  double mm = 0.0;           ///< of the landmark from the ray, at its place
+  double px = 0.0;  ///< on the detector, in its pixels (columns and rows scaled separately)
+  double mm = 0.0;  ///< from the landmark to the ray, at the landmark's depth
 };
 
 /// A pose from landmarks.
@@ -33,18 +33,18 @@ struct LandmarkPose {
   std::vector<LandmarkResidual> residuals;
   double rms_px = 0.0;
   double rms_mm = 0.0;
-  /// How it was found, and what had to be chosen: "3 landmarks in 1 view leave 2 poses; ...".
+  /// How the pose was found, and what had to be chosen: "3 landmarks in 1 view leave 2 poses; ...".
   std::vector<std::string> notes;
 };
 
-/// The pose with the least sum of squared distances on the detectors (mm) between the landmarks as
-/// the views saw them and as the cameras project them, found by Levenberg-Marquardt from the
-/// triangulated points (seen in two views or more; Arun et al. 1987) and from 96 rotations over all
-/// of SO(3), each with the translation that brings the points nearest to their rays. Poses that fit
-/// about as well (as three points in one view have up to four, and points near a plane two) are
-/// told apart by `nominal_room_from_ct`: the one turned least from it is taken, and a note says so.
-/// InputError: fewer than three different landmarks are seen, those are on one line, counts differ,
-/// or no pose puts them before the cameras.
+/// The pose with the least sum of squared distances (mm on the detectors) between the landmarks
+/// that the views saw and their projections. Levenberg-Marquardt finds it from several starts: the
+/// triangulated points (seen in two views or more; Arun et al. 1987), and 96 rotations over all of
+/// SO(3), each with the translation that brings the points nearest to their rays.
+/// Several poses may fit about as well: three points in one view have up to four, points near a
+/// plane two. The pose turned least from `nominal_room_from_ct` is then taken, and a note says so.
+/// Throws InputError when fewer than three different landmarks are seen, when those are on one
+/// line, when counts differ, or when no pose puts them in front of the cameras.
 /// \test LandmarkPose.OfOneViewAndFourPointsIsTheTrueOne
 LandmarkPose pose_from_landmarks(std::span<const LandmarkView> views,
                                  std::span<const Eigen::Vector3d> landmarks_ct_mm,

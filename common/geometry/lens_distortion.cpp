@@ -11,7 +11,7 @@
 namespace af {
 namespace {
 
-/// f of the model and its derivative by r2.
+/// f of the model, and its derivative with respect to r2.
 struct RadialFactor {
   double value;
   double slope;
@@ -26,7 +26,7 @@ RadialFactor radial_factor(const std::array<double, 8>& k, double r2) {
   return {above / below, (above_slope * below - above * below_slope) / (below * below), below};
 }
 
-/// Neither turned over in one direction nor, behind a second fold, in both.
+/// False where the image is mirrored in one direction or, behind a second fold, in both.
 bool keeps_its_sides(const Eigen::Matrix2d& jacobian) {
   return jacobian.determinant() > 0.0 && jacobian.trace() > 0.0;
 }
@@ -90,7 +90,7 @@ Eigen::Vector2d PixelDistortion::stored_from_ideal(const Eigen::Vector2d& pixel)
 
 std::optional<Eigen::Vector2d> PixelDistortion::ideal_from_stored(
     const Eigen::Vector2d& pixel) const {
-  // Newton's steps from the stored place: real lenses need three or four.
+  // Newton's method from the stored place: real lenses need three or four steps.
   constexpr int kMostSteps = 50;
   constexpr double kExactPx = 1e-9;
   const Eigen::Vector2d wanted = normalised(pixel);

@@ -22,24 +22,24 @@ struct LensDistortion {
   auto members() { return std::tie(coefficients); }
 
   [[nodiscard]] bool is_none() const;
-  /// As many as are written: 0, 5 or 8.
+  /// How many coefficients are written: 0, 5 or 8.
   [[nodiscard]] std::size_t count() const;
   [[nodiscard]] Eigen::Vector2d distorted(const Eigen::Vector2d& at) const;
-  /// Derivative of distorted() by `at`; not finite where the denominator of f is 0.
+  /// Derivative of distorted() with respect to `at`; not finite where the denominator of f is 0.
   [[nodiscard]] Eigen::Matrix2d jacobian(const Eigen::Vector2d& at) const;
-  /// The same lens for images whose rows run the other way: PinholeCamera then turns x and y round.
+  /// The same lens for images whose rows run the other way: PinholeCamera then reverses x and y.
   [[nodiscard]] LensDistortion with_rows_flipped() const;
 
   bool operator==(const LensDistortion&) const = default;
 };
 
 /// Maps between ideal pixels, those of a camera without distortion, and pixels of its stored,
-/// distorted images. Only X-ray files have the latter. K is that of pinhole_of(camera).
+/// distorted images. Only X-ray files hold the latter. K is that of pinhole_of(camera).
 class PixelDistortion {
  public:
   explicit PixelDistortion(const CameraGeometry& camera);
 
-  /// Where the stored image shows what an undistorted one shows at (column, row).
+  /// Where the stored image shows what the undistorted image shows at (column, row).
   [[nodiscard]] Eigen::Vector2d stored_from_ideal(const Eigen::Vector2d& pixel) const;
   /// The reverse, to 1e-9 px; nullopt where the lens shows no point.
   [[nodiscard]] std::optional<Eigen::Vector2d> ideal_from_stored(
@@ -55,7 +55,7 @@ class PixelDistortion {
   Eigen::Vector2d center_px_;
 };
 
-/// Why a camera cannot have its distortion; empty when it can: coefficients are finite, and no part
+/// Why a camera cannot have its distortion. Empty when it can: coefficients are finite, and no part
 /// of the image is folded.
 std::string distortion_problem(const CameraGeometry& camera);
 

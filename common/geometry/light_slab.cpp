@@ -7,7 +7,7 @@ namespace af {
 
 namespace {
 
-/// Derivative of where a ray meets the plane y = plane_y_mm, as the ray changes.
+/// Derivative of the point where a ray meets the plane y = plane_y_mm, as the ray changes.
 Eigen::Vector3d hit_derivative(const Ray& ray, double plane_y_mm, const Ray& change) {
   const double scale = (plane_y_mm - ray.origin_point.y()) / ray.direction.y();
   const double d_scale =

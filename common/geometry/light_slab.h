@@ -61,7 +61,7 @@ struct LightSlab {
   GridAxis u;
   GridAxis v;
   std::vector<SlabGeometry> slabs;  ///< K of them; 1 is the paper's field
-  /// No attenuation has a greater y; infinite where that is not known.
+  /// Upper bound of the y of all attenuation; infinite where it is unknown.
   double attenuation_end_y_mm = std::numeric_limits<double>::infinity();
 
   [[nodiscard]] Eigen::Vector3d viewpoint(int u_node, int v_node) const {
@@ -70,8 +70,8 @@ struct LightSlab {
   [[nodiscard]] Eigen::Vector3d st_point(const SlabGeometry& slab, int s_node, int t_node) const {
     return {slab.s.position_mm(s_node), slab.st_plane_y_mm, slab.t.position_mm(t_node)};
   }
-  /// Whether a slab and all attenuation lie before a source at `y_mm`. A field holds whole lines,
-  /// but rays begin at the source.
+  /// Whether a slab and all attenuation lie in front of a source at `y_mm`. A field holds whole
+  /// lines, but rays begin at the source.
   [[nodiscard]] bool lies_before(double y_mm, const SlabGeometry& slab) const {
     return y_mm > slab.st_plane_y_mm &&
            (y_mm > attenuation_end_y_mm || std::isinf(attenuation_end_y_mm));
@@ -80,14 +80,14 @@ struct LightSlab {
   /// descend in y, or has attenuation behind or around its origin.
   [[nodiscard]] std::optional<RayNodes> intersect(const Ray& ray_in_slab,
                                                   const SlabGeometry& slab) const;
-  /// Derivative of a value as its ray's origin and direction change, from its `slopes` with respect
-  /// to the node coordinates (u, v, s, t).
+  /// Derivative of a value as its ray's origin and direction change. `slopes` are the value's
+  /// derivatives with respect to the node coordinates (u, v, s, t).
   [[nodiscard]] double slope_along(const std::array<double, 4>& slopes,
                                    const Ray& ray_in_slab,
                                    const Ray& change,
                                    const SlabGeometry& slab) const;
 
-  /// The nodes alone: all of u and v, and the part of s and t that slab `k` stores.
+  /// The nodes as integers: all of u and v, and the part of s and t that slab `k` stores.
   [[nodiscard]] SlabLattice lattice(std::size_t k) const {
     return {{u.nodes, {0, u.nodes}},
             {v.nodes, {0, v.nodes}},

@@ -7,7 +7,7 @@
 
 namespace af {
 
-/// Of a parameter's name without its unit: "rx".
+/// Length of a parameter's name without its unit: "rx".
 constexpr std::size_t kNameLength = 2;
 
 MotionRange::MotionRange(double max_rotation_rad, double max_translation_mm)
@@ -25,8 +25,7 @@ std::string parameter_names(const ParameterSet& parameters) {
 }
 
 ParameterSet MotionRange::beyond(const PoseParameters& parameters) const {
-  // A start given in degrees exactly at the limit must not fall outside by the rounding of the
-  // conversion.
+  // The conversion from degrees rounds. A start given exactly at the limit must still lie within.
   constexpr double kRounding = 1e-12;
   const auto is_between = [](double value, double lowest, double most) {
     return value >= lowest - kRounding && value <= most + kRounding;
@@ -75,15 +74,15 @@ MotionRange MotionRange::scaled(double factor) const {
 }
 
 PoseParameters MotionRange::clamped(const PoseParameters& parameters, double share) const {
-  const auto of = [&](const Eigen::Vector3d& value,
-                      const Eigen::Vector3d& lowest,
-                      const Eigen::Vector3d& most) {
+  const auto clamp = [&](const Eigen::Vector3d& value,
+                         const Eigen::Vector3d& lowest,
+                         const Eigen::Vector3d& most) {
     const Eigen::Vector3d middle = 0.5 * (lowest + most);
     const Eigen::Vector3d half = share * (0.5 * (most - lowest));
     return Eigen::Vector3d(value.cwiseMax(middle - half).cwiseMin(middle + half));
   };
-  return {of(parameters.rotation_rad, low.rotation_rad, high.rotation_rad),
-          of(parameters.translation_mm, low.translation_mm, high.translation_mm)};
+  return {clamp(parameters.rotation_rad, low.rotation_rad, high.rotation_rad),
+          clamp(parameters.translation_mm, low.translation_mm, high.translation_mm)};
 }
 
 std::string MotionRange::text() const {

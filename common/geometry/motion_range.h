@@ -16,14 +16,14 @@ using ParameterSet = std::bitset<6>;
 /// "rx, rz, tx"
 std::string parameter_names(const ParameterSet& parameters);
 
-/// The motion box of a field: bounds of each angle and of each translation relative to its
-/// PoseFrame. The box need not hold zero, the nominal pose.
+/// The motion box of a field: bounds of each angle and each translation relative to its PoseFrame.
+/// The box need not hold the nominal pose, zero.
 struct MotionRange {
   PoseParameters low;
   PoseParameters high;
 
   MotionRange() : MotionRange(10.0 * kRadPerDeg, 100.0) {}
-  /// The same to both sides of zero about and along every axis.
+  /// The same bound on both sides of zero for every axis.
   MotionRange(double max_rotation_rad, double max_translation_mm);
   MotionRange(const PoseParameters& lowest, const PoseParameters& highest)
       : low(lowest), high(highest) {}
@@ -33,30 +33,30 @@ struct MotionRange {
   [[nodiscard]] bool contains(const PoseParameters& parameters) const {
     return beyond(parameters).none();
   }
-  /// Whether two numbers say all: max_rotation_rad() and max_translation_mm().
+  /// Whether max_rotation_rad() and max_translation_mm() state the whole range.
   [[nodiscard]] bool is_symmetric() const;
-  /// Farthest from zero of any bound.
+  /// The bound farthest from zero.
   [[nodiscard]] double max_rotation_rad() const;
   [[nodiscard]] double max_translation_mm() const;
-  /// The largest box within this one that two numbers can state; of size 0 where this one misses
-  /// zero.
+  /// The largest box within this one that two numbers can state. Its size is 0 where this box does
+  /// not hold zero.
   [[nodiscard]] MotionRange symmetric_part() const;
   [[nodiscard]] MotionRange scaled(double factor) const;
-  /// The parameters, each brought into the middle `share` of its bounds.
+  /// The parameters, each clamped to the middle `share` of its bounds.
   [[nodiscard]] PoseParameters clamped(const PoseParameters& parameters, double share = 1.0) const;
   /// "+-10 degrees, +-30 mm", or the bounds of each axis.
   [[nodiscard]] std::string text() const;
 };
 
-/// Why a field cannot be sized for it; empty when it can.
+/// Why a field cannot be sized for the range; empty when it can.
 std::vector<std::string> problems(const MotionRange& range);
 
-/// The pose of a range at a share of each axis' bounds, 0 at its low and 1 at its high one: three
-/// rotations, then three translations.
+/// The pose at a share of each axis' bounds, 0 at the low and 1 at the high one: three rotations,
+/// then three translations.
 PoseParameters pose_at(const MotionRange& range, const std::array<double, 6>& share);
 
-/// The corner of a range whose `axis`th parameter is high where bit `axis` of `corner` is set,
-/// otherwise low; corner < 64.
+/// A corner of a range. Its parameter `axis` is high where bit `axis` of `corner` is set, otherwise
+/// low; corner < 64.
 PoseParameters corner_pose(const MotionRange& range, unsigned corner);
 
 /// Uniform within the range; takes six draws.

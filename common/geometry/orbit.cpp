@@ -15,7 +15,7 @@ namespace af {
 
 namespace {
 
-/// The one axis whose turns add to an angle of a pose: Rz is the outermost of Rz Ry Rx.
+/// Turns add to an angle of a pose about this axis alone: Rz is the outermost of Rz Ry Rx.
 constexpr int kOutermostAxis = 2;
 
 Eigen::Matrix3d turn(const Orbit& orbit, double angle_rad) {
@@ -36,7 +36,7 @@ std::vector<double> angles_within(const Angles& angles, double step_rad) {
   return values;
 }
 
-/// The smallest box that points were put into.
+/// The smallest box that holds the points put into it.
 struct PointBox {
   Eigen::Vector3d low = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());
   Eigen::Vector3d high = Eigen::Vector3d::Constant(-std::numeric_limits<double>::infinity());
@@ -47,13 +47,13 @@ struct PointBox {
   }
 };
 
-/// Translations of the poses of `range` as seen by cameras that stand `off` from a member: the box
-/// turned back about the isocentre.
+/// Translations of the poses of `range` as seen by cameras that stand `off` from a member. This is
+/// the box turned back about the isocentre.
 PointBox translations_seen(const Orbit& orbit,
                            const Eigen::Vector3d& from_isocenter_mm,
                            const MotionRange& range,
                            const Angles& off) {
-  // Between two angles a point at the distance r comes at most r (1 - cos(step / 2)) farther.
+  // Between two angles a point at distance r reaches at most r (1 - cos(step / 2)) farther.
   constexpr double kStepRad = 0.25 * kRadPerDeg;
   PointBox box;
   double farthest_mm = 0.0;
@@ -74,11 +74,11 @@ PointBox translations_seen(const Orbit& orbit,
 }
 
 /// Angles of the poses of `range` as seen by cameras that stand `off` from a member, about an axis
-/// whose turns change all three. Searched on a grid; an extreme between its nodes exceeds the
-/// grid's by far less than the margin.
+/// whose turns change all three angles. A grid search is enough: an extreme between its nodes
+/// exceeds the grid's by far less than the margin.
 PointBox rotations_seen(const Orbit& orbit, const MotionRange& range, const Angles& off) {
   constexpr int kParts = 8;
-  constexpr double kMargin = 0.01;  // of the box
+  constexpr double kMargin = 0.01;  // share of the box
   const auto nodes = [&](int axis) {
     const Angles angles{range.low.rotation_rad[axis], range.high.rotation_rad[axis]};
     const double width = angles.high_rad - angles.low_rad;
@@ -98,18 +98,19 @@ PointBox rotations_seen(const Orbit& orbit, const MotionRange& range, const Angl
   return box;
 }
 
-/// 200 degrees are ten steps of 20 after any conversion.
+/// Makes 200 degrees ten steps of 20 after any conversion.
 constexpr double kRounding = 1e-9;
 
 /// Where members stand.
 struct Tiling {
   double first_rad = 0.0;
   double step_rad = 0.0;
-  double count = 0.0;  ///< whole; of any size, until it is checked
+  double count = 0.0;  ///< a whole number; unlimited until it is checked
 };
 
-/// Fewest equal tiles, no wider than `most_step_rad`, that hold all angles. Where these hold 0, the
-/// nominal camera's angle, a tile stands about it: a seam would cost every pose there two look-ups.
+/// Fewest equal tiles that hold all angles and are no wider than `most_step_rad`. If the angles
+/// hold 0, the nominal camera's angle, a tile is centred there: a seam would cost every pose two
+/// look-ups.
 Tiling tiling_of(const Angles& angles, double most_step_rad) {
   const double width = angles.high_rad - angles.low_rad;
   if (angles.low_rad > 0.0 || angles.high_rad < 0.0) {
@@ -125,8 +126,8 @@ Tiling tiling_of(const Angles& angles, double most_step_rad) {
   return {-below * step, step, below + 1.0 + above};
 }
 
-/// Where the source of a camera stands about an orbit's axis, as the CT at the nominal pose sees
-/// it.
+/// Angle at which a camera's source stands about an orbit's axis, as the CT at the nominal pose
+/// sees it.
 class SourceAngle {
  public:
   SourceAngle(const CameraGeometry& camera,
@@ -142,8 +143,8 @@ class SourceAngle {
   }
 
   /// Largest sign * (angle from where the camera's own source stands + turn_share * rz) over a box
-  /// of poses. Over the shifts it is largest in a corner: sources on one side of a half-plane
-  /// through the axis are a convex set.
+  /// of poses. Corners are enough for the shifts: sources on one side of a half-plane through the
+  /// axis are a convex set.
   [[nodiscard]] double largest(const MotionRange& box, double sign, double turn_share) const {
     return maxima_over_rotations(
                box,
@@ -162,12 +163,12 @@ class SourceAngle {
         .front();
   }
 
-  /// Half-space (ct frame) of sources at less than `angle_rad`, over half a turn; `sign` -1: at
-  /// more.
+  /// Half-space (ct frame) of sources at less than `angle_rad`, over half a turn. With `sign` -1:
+  /// at more.
   [[nodiscard]] HalfSpace half_space(double angle_rad, double sign, const PoseFrame& frame) const {
     const Eigen::Vector3d normal =
         sign * (std::cos(angle_rad) * aside_ - std::sin(angle_rad) * ahead_);
-    // Through the axis, which is `axis_` before the frame's centre.
+    // The plane passes through the axis, which lies at `axis_` before the frame's centre.
     const HalfSpace about_center{normal, -normal.dot(axis_)};
     RigidTransform ct_from_center = RigidTransform::Identity();
     ct_from_center.linear() = frame.rotation.transpose();
@@ -176,7 +177,7 @@ class SourceAngle {
   }
 
  private:
-  /// The angle of a source seen from the frame's centre.
+  /// The angle of a source at this place, given from the frame's centre.
   [[nodiscard]] double of_source(const Eigen::Vector3d& from_center) const {
     const Eigen::Vector3d from_axis = from_center + axis_;
     return std::atan2(aside_.dot(from_axis), ahead_.dot(from_axis));
@@ -207,20 +208,21 @@ struct TiledOrbit {
   const PoseFrame& frame;
   const MotionRange& range;
   const Orbit& orbit;
-  double half_rad;  ///< of a tile
+  double half_rad;  ///< half the width of a tile
 };
 
-/// Poses that a member is sized for, when a pose's camera and CT are turned towards each other by
-/// up to `below` and `above` beyond the member's angle.
-MotionRange box_within(const TiledOrbit& of, double below_rad, double above_rad) {
-  const int axis = of.orbit.axis;
-  const PointBox shifts = translations_seen(
-      of.orbit,
-      of.frame.center_room_mm - of.isocenter_point,
-      of.range,
-      {of.range.low.rotation_rad[axis] - below_rad, of.range.high.rotation_rad[axis] + above_rad});
-  MotionRange box = of.range;
-  // Wider by what rounding may take, so that neighbours touch.
+/// Poses that a member is sized for, when a pose's camera and CT turn towards each other by up to
+/// `below_rad` and `above_rad` beyond the member's angle.
+MotionRange box_within(const TiledOrbit& tiled_orbit, double below_rad, double above_rad) {
+  const int axis = tiled_orbit.orbit.axis;
+  const PointBox shifts =
+      translations_seen(tiled_orbit.orbit,
+                        tiled_orbit.frame.center_room_mm - tiled_orbit.isocenter_point,
+                        tiled_orbit.range,
+                        {tiled_orbit.range.low.rotation_rad[axis] - below_rad,
+                         tiled_orbit.range.high.rotation_rad[axis] + above_rad});
+  MotionRange box = tiled_orbit.range;
+  // The bounds are wider by what rounding may take, so that neighbours touch.
   box.low.rotation_rad[axis] = -above_rad - kRounding;
   box.high.rotation_rad[axis] = below_rad + kRounding;
   box.low.translation_mm = shifts.low;
@@ -230,33 +232,39 @@ MotionRange box_within(const TiledOrbit& of, double below_rad, double above_rad)
 
 /// Poses as seen by cameras that stand `off` from a member, about an axis whose turns change all
 /// angles.
-MotionRange box_seen(const TiledOrbit& of, const Angles& off) {
+MotionRange box_seen(const TiledOrbit& tiled_orbit, const Angles& off) {
   const PointBox shifts =
-      translations_seen(of.orbit, of.frame.center_room_mm - of.isocenter_point, of.range, off);
-  const PointBox angles = rotations_seen(of.orbit, of.range, off);
+      translations_seen(tiled_orbit.orbit,
+                        tiled_orbit.frame.center_room_mm - tiled_orbit.isocenter_point,
+                        tiled_orbit.range,
+                        off);
+  const PointBox angles = rotations_seen(tiled_orbit.orbit, tiled_orbit.range, off);
   return {{angles.low, shifts.low}, {angles.high, shifts.high}};
 }
 
-/// Where the sources of a member end, on either side of its angle.
+/// Where the sources of a member end, on both sides of its angle.
 struct SourceBounds {
   double reach_rad = 0.0;
   bool has_below = true;
   bool has_above = true;
 };
 
-/// Bounds a member by sources. Leaves it as it is where shifts and turns move these too far.
-void bound_by_sources(const TiledOrbit& of, const SourceBounds& bounds, OrbitMember& member) {
+/// Bounds a member by sources. Does nothing where shifts and turns move the sources too far.
+void bound_by_sources(const TiledOrbit& tiled_orbit,
+                      const SourceBounds& bounds,
+                      OrbitMember& member) {
   constexpr double kMostAsideRad = 20.0 * kRadPerDeg;
   constexpr double kMostReachRad = 60.0 * kRadPerDeg;
-  constexpr double kLeastHeld = 0.05;  // of what the tile's poses are
+  constexpr double kLeastHeld = 0.05;  // share of the tile's poses
   if (bounds.reach_rad > kMostReachRad) return;
-  const SourceAngle angle(member.camera, of.isocenter_point, of.frame, of.orbit);
+  const SourceAngle angle(
+      member.camera, tiled_orbit.isocenter_point, tiled_orbit.frame, tiled_orbit.orbit);
   const auto box_beyond = [&](double aside_rad) {
-    return box_within(of,
-                      bounds.has_below ? bounds.reach_rad + aside_rad : of.half_rad,
-                      bounds.has_above ? bounds.reach_rad + aside_rad : of.half_rad);
+    return box_within(tiled_orbit,
+                      bounds.has_below ? bounds.reach_rad + aside_rad : tiled_orbit.half_rad,
+                      bounds.has_above ? bounds.reach_rad + aside_rad : tiled_orbit.half_rad);
   };
-  // How far poses put the source from where their turn about the axis alone would.
+  // Poses put the source farther than their turn about the axis alone would: by this much.
   const MotionRange widest = box_beyond(kMostAsideRad);
   const double aside = std::max(angle.largest(widest, 1.0, 1.0), angle.largest(widest, -1.0, 1.0));
   if (!(aside <= kMostAsideRad)) return;
@@ -275,9 +283,10 @@ void bound_by_sources(const TiledOrbit& of, const SourceBounds& bounds, OrbitMem
   }
   member.range = shrunk(member.range, held);
   member.sized_for = box_beyond(aside);
-  if (bounds.has_above) member.sources.push_back(angle.half_space(bounds.reach_rad, 1.0, of.frame));
+  if (bounds.has_above)
+    member.sources.push_back(angle.half_space(bounds.reach_rad, 1.0, tiled_orbit.frame));
   if (bounds.has_below)
-    member.sources.push_back(angle.half_space(-bounds.reach_rad, -1.0, of.frame));
+    member.sources.push_back(angle.half_space(-bounds.reach_rad, -1.0, tiled_orbit.frame));
 }
 
 /// "A_z-80", "A_z7.5".
@@ -331,7 +340,8 @@ std::vector<OrbitMember> orbit_members(const CameraGeometry& nominal,
   const bool adds_up = orbit.axis == kOutermostAxis;
   const double lowest = range.low.rotation_rad[orbit.axis];
   const double highest = range.high.rotation_rad[orbit.axis];
-  // What members tile: angles of cameras, or, where they add up, of cameras less those of poses.
+  // Members tile the cameras' angles. About an axis whose turns add up, they tile cameras' angles
+  // minus poses' angles.
   const Angles tiled{orbit.from_rad - (adds_up ? highest : 0.0),
                      orbit.to_rad - (adds_up ? lowest : 0.0)};
   const double most_step = orbit.step_rad.value_or(default_step_rad(orbit, range));
@@ -342,9 +352,10 @@ std::vector<OrbitMember> orbit_members(const CameraGeometry& nominal,
                      "would take " + std::to_string(static_cast<std::int64_t>(tiling.count)) +
                          " fields; at most " + std::to_string(kMaxOrbitMembers) +
                          " stand in a file: take a larger step");
-  const TiledOrbit of{isocenter_point, frame, range, orbit, 0.5 * tiling.step_rad};
-  const MotionRange of_member = adds_up ? box_within(of, of.half_rad, of.half_rad)
-                                        : box_seen(of, {-of.half_rad, of.half_rad});
+  const TiledOrbit tiled_orbit{isocenter_point, frame, range, orbit, 0.5 * tiling.step_rad};
+  const MotionRange of_member =
+      adds_up ? box_within(tiled_orbit, tiled_orbit.half_rad, tiled_orbit.half_rad)
+              : box_seen(tiled_orbit, {-tiled_orbit.half_rad, tiled_orbit.half_rad});
   std::vector<OrbitMember> members;
   const int count = static_cast<int>(tiling.count);
   for (int i = 0; i < count; ++i) {
@@ -356,7 +367,8 @@ std::vector<OrbitMember> orbit_members(const CameraGeometry& nominal,
                        {}};
     member.camera.name = member_name(nominal.name, orbit, angle);
     if (adds_up && orbit.members_by == Orbit::MembersBy::Source)
-      bound_by_sources(of, {of.half_rad + kSeamOverlapRad, i > 0, i + 1 < count}, member);
+      bound_by_sources(
+          tiled_orbit, {tiled_orbit.half_rad + kSeamOverlapRad, i > 0, i + 1 < count}, member);
     members.push_back(std::move(member));
   }
   return members;
@@ -369,15 +381,15 @@ OrbitMember member_of_sources(const CameraGeometry& nominal,
                               double angle_rad,
                               double reach_rad) {
   const Orbit orbit{kOutermostAxis, angle_rad, angle_rad, {}};
-  const TiledOrbit of{isocenter_point, frame, range, orbit, reach_rad};
-  const MotionRange box = box_within(of, reach_rad, reach_rad);
+  const TiledOrbit tiled_orbit{isocenter_point, frame, range, orbit, reach_rad};
+  const MotionRange box = box_within(tiled_orbit, reach_rad, reach_rad);
   OrbitMember member{turned_camera(nominal, isocenter_point, orbit.direction(), angle_rad),
                      angle_rad,
                      box,
                      box,
                      {}};
   member.camera.name = member_name(nominal.name, orbit, angle_rad);
-  bound_by_sources(of, {reach_rad, true, true}, member);
+  bound_by_sources(tiled_orbit, {reach_rad, true, true}, member);
   return member;
 }
 

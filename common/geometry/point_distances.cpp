@@ -21,7 +21,7 @@ PointMap map_of(const Eigen::Matrix3d& matrix, const Eigen::Vector3d& offset) {
   return map;
 }
 
-/// Columns, rows and depth of a camera with its source at the origin, from the ct frame.
+/// Maps the ct frame to columns, rows and depth of a camera with its source at the origin.
 PointMap camera_from_ct(const CameraGeometry& camera, const RigidTransform& room_from_ct) {
   Eigen::Matrix3d axes;
   axes << camera.column_direction.transpose(), camera.row_direction.transpose(),

@@ -13,11 +13,11 @@ double sum_of_lengths_mm(std::span<const Eigen::Vector3d> points_ct_mm,
                          const Eigen::Matrix3d& matrix,
                          const Eigen::Vector3d& offset_mm);
 
-/// Sums over points of distances between where two poses put them, as one camera sees it; NaN when
-/// a point lies behind the source.
+/// How far apart two poses put the points as one camera sees them, summed over points. NaN when a
+/// point lies behind the source.
 struct ProjectionDistances {
-  double reprojection_mm = 0.0;  ///< of the gold point from the line through source and point
-  double detector_mm = 0.0;      ///< of both projections on the detector
+  double reprojection_mm = 0.0;  ///< from the gold point to the line through source and point
+  double detector_mm = 0.0;      ///< between both projections on the detector
 };
 ProjectionDistances projection_distances(const CameraGeometry& camera,
                                          std::span<const Eigen::Vector3d> points_ct_mm,

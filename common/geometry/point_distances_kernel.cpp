@@ -8,7 +8,7 @@ namespace af::AF_KERNEL_NAMESPACE {
 namespace {
 
 constexpr int kLanes = AF_VECTOR_BITS / 64;
-constexpr int kParts = 8;  // partial sums, whatever the width
+constexpr int kParts = 8;  // partial sums, the same for every vector width
 constexpr int kGroups = kParts / kLanes;
 
 using native::Doubles;
@@ -55,8 +55,8 @@ struct PartialSums {
   }
 };
 
-/// Calls add(group, points, weights) for every register of points; the last block is filled up with
-/// copies of the last point of weight 0.
+/// Calls add(group, points, weights) for every register of points. Copies of the last point, with
+/// weight 0, fill the last block.
 template <typename Add>
 AF_KERNEL_INLINE void for_each_register(const double* points, int64_t count, Add add) {
   const Doubles one = Doubles{} + 1.0;

@@ -11,15 +11,15 @@ struct PointMap {
   double offset[3];
 };
 
-/// Sum of |map(x)| over `count` points (x, y, z one after the other). Added up in eight parts, so
-/// that every vector width gives identical bits.
+/// Sum of |map(x)| over `count` points (x, y, z one after the other). It is added in eight parts,
+/// so that every vector width gives identical bits.
 using SumLengths = double(const double* points, int64_t count, const PointMap& map);
 
 /// What points contribute in one camera.
 struct ProjectionSums {
-  double reprojection;    ///< distance of the gold point from the line through source and point
-  double slope;           ///< distance of both projections on a detector at depth 1
-  double smallest_depth;  ///< of any point or gold point
+  double reprojection;    ///< distance from the gold point to the line through source and point
+  double slope;           ///< distance between both projections on a detector at depth 1
+  double smallest_depth;  ///< over all points and gold points
 };
 
 /// The maps lead into the camera's frame: source at the origin, depth along z.

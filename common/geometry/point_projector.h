@@ -6,8 +6,7 @@
 namespace af {
 
 /// Projects many points by one camera, with exactly the bits of CameraGeometry's depth_mm() and
-/// project(). Those compute some values anew for each point; this computes them once. The camera
-/// outlives it.
+/// project(). It computes once what those compute for each point. The camera must outlive it.
 class PointProjector {
  public:
   explicit PointProjector(const CameraGeometry& camera)

@@ -20,8 +20,8 @@ bool holds(const GridAxis& x, const GridAxis& z, const PlaneExtent& extent) {
          z.contains(extent.z_low_mm) && z.contains(extent.z_high_mm);
 }
 
-/// The corners of the range alone: far cheaper than the search, and most boxes that are too large
-/// fail there.
+/// Tests the corners of the range alone. This is far cheaper than the search, and most boxes that
+/// are too large fail here.
 bool covers_corners(const LightSlab& light_slab,
                     const CameraGeometry& camera,
                     const PoseFrame& frame,
@@ -71,7 +71,7 @@ MotionRange covered_box(const LightSlab& light_slab,
   constexpr double kMostMm = 1000.0;
   double rotation_rad = proportion.max_rotation_rad();
   double translation_mm = proportion.max_translation_mm();
-  if (!(rotation_rad > 0.0) && !(translation_mm > 0.0)) {  // of a field for one pose
+  if (!(rotation_rad > 0.0) && !(translation_mm > 0.0)) {  // a field for one pose
     rotation_rad = 1.0 * kRadPerDeg;
     translation_mm = 3.0;
   }
@@ -83,8 +83,8 @@ MotionRange covered_box(const LightSlab& light_slab,
   };
   if (!is_covered(0.0)) return {0.0, 0.0};
   if (is_covered(most)) return unit.scaled(most);
-  // Larger boxes hold smaller ones, so halving finds the edge. The field's own size is asked for
-  // first: it is the answer for its own camera.
+  // Larger boxes hold smaller ones, so halving finds the edge. The field's own size comes first,
+  // because it is the answer for its own camera.
   double covered = 0.0;
   double uncovered = most;
   for (double next = std::min(1.0, 0.5 * most);; next = 0.5 * (covered + uncovered)) {

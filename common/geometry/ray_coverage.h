@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which rays a field holds decides what it can be used for, not the camera it was made for.
+// The rays that a field holds decide what it can be used for, not the camera that it was made for.
 #pragma once
 
 #include <cstdint>
@@ -10,27 +10,27 @@
 
 namespace af {
 
-/// Whether all rays of the whole detector meet every plane of the light slab within its rectangle,
-/// and their source is before all attenuation, wherever the CT is within `range` about the nominal
-/// pose of `frame`. Computed as planes are sized (hit_extents), not from sampled poses. \test
-/// RayCoverage.SaysWhatSampledRaysSay
+/// Whether the light slab holds all rays of the detector wherever the CT is within `range` about
+/// the nominal pose of `frame`. Every ray must meet every plane within its rectangle, and its
+/// source must lie in front of all attenuation. Computed as planes are sized (hit_extents), not
+/// from sampled poses. \test RayCoverage.SaysWhatSampledRaysSay
 bool covers_range(const LightSlab& light_slab,
                   const CameraGeometry& camera,
                   const PoseFrame& frame,
                   const MotionRange& range);
 
-/// The largest box about the nominal pose of `frame` (angles and translations to both sides in the
-/// proportion of `proportion`, at most 60 degrees) whose poses are all covered. Its bounds may be
-/// too small by at most the share `kCoveredBoxTolerance`, but never too large. It has size 0 when
-/// no more than the nominal pose is covered, or not even that; covers_range() tells which.
+/// The largest box about the nominal pose of `frame` whose poses are all covered: angles and
+/// translations to both sides in the proportion of `proportion`, at most 60 degrees. Its bounds may
+/// be too small by the share `kCoveredBoxTolerance`, but never too large. It has size 0 when at
+/// most the nominal pose is covered; covers_range() tells whether that is.
 MotionRange covered_box(const LightSlab& light_slab,
                         const CameraGeometry& camera,
                         const PoseFrame& frame,
                         const MotionRange& proportion);
 inline constexpr double kCoveredBoxTolerance = 2e-3;
 
-/// "field covers 100 % of camera A's rays within 6.2 deg / 18 mm of nominal" of a box, or what
-/// share of them where the nominal pose itself is not all covered. Numbers are rounded down.
+/// "field covers 100 % of camera A's rays within 6.2 deg / 18 mm of nominal" for a box. Where not
+/// even the nominal pose is fully covered, it says what share is. Numbers are rounded down.
 std::string coverage_text(const std::string& camera,
                           std::int64_t rays_inside,
                           std::int64_t rays,

@@ -57,8 +57,8 @@ Eigen::Vector3d angles_from_rotation(const Eigen::Matrix3d& rotation) {
   const double angle_y = std::atan2(-rotation(2, 0), cos_y);
   constexpr double kGimbalLock = 1e-12;
   const double angle_z = cos_y < kGimbalLock ? 0.0 : std::atan2(rotation(1, 0), rotation(0, 0));
-  // rx comes from the rest after rz, Rz^-1 R = Ry Rx: near gimbal lock rz is badly determined, and
-  // this rx corrects its error.
+  // rx comes from what is left after rz: Rz^-1 R = Ry Rx. Near gimbal lock rz is ill-determined,
+  // and this rx corrects its error.
   const double sin_z = std::sin(angle_z);
   const double cos_z = std::cos(angle_z);
   const double angle_x = std::atan2(sin_z * rotation(0, 2) - cos_z * rotation(1, 2),

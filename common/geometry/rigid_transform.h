@@ -45,7 +45,8 @@ struct PoseFrame {
   Eigen::Vector3d center_room_mm = Eigen::Vector3d::Zero();  ///< r, in the room frame
 
   [[nodiscard]] RigidTransform nominal_room_from_ct() const;
-  /// Frame whose zero parameters give `room_from_ct` and whose rotations are about `center_ct_mm`.
+  /// The frame whose zero parameters give `room_from_ct`, and whose rotations are about
+  /// `center_ct_mm`.
   static PoseFrame about(const RigidTransform& room_from_ct, const Eigen::Vector3d& center_ct_mm);
 };
 
@@ -58,32 +59,32 @@ Eigen::Vector3d angles_from_rotation(const Eigen::Matrix3d& rotation);
 RigidTransform pose_from_parameters(const PoseFrame& frame, const PoseParameters& parameters);
 PoseParameters parameters_from_pose(const PoseFrame& frame, const RigidTransform& room_from_ct);
 
-/// Small motions (rotations about the room's axes through r + t in rad, then translations along
-/// them in mm) per unit of every pose parameter (rad, mm; columns): x_room = r + t + Rz Ry Rx R0 (x
-/// - c) turns about r + t, by rx about Rz Ry e_x, by ry about Rz e_y, by rz about e_z. \test
-/// PoseParameters.MoveThePoseAsTheirMotionsSay
+/// Small motions per unit of every pose parameter (rad, mm; columns). Motions are rotations about
+/// the room's axes through r + t in rad, then translations along the axes in mm. The pose x_room =
+/// r + t + Rz Ry Rx R0 (x - c) turns about r + t: by rx about Rz Ry e_x, by ry about Rz e_y, by rz
+/// about e_z. \test PoseParameters.MoveThePoseAsTheirMotionsSay
 Eigen::Matrix<double, 6, 6> motions_from_parameters(const PoseParameters& parameters);
 
 /// Why the 4x4 matrix is not a rigid transform (tolerance 1e-5 on orthonormality) within 1 km;
 /// empty when it is one.
 std::vector<std::string> rigidity_problems(const Eigen::Matrix4d& matrix);
 
-/// The nearest rigid transform of a matrix that passed rigidity_problems() (re-orthonormalised by
-/// SVD); one that is orthonormal to 1e-14 keeps its bits, so that written poses read back the same.
+/// The nearest rigid transform of a matrix that passed rigidity_problems(), orthonormalised by SVD.
+/// A matrix that is orthonormal to 1e-14 keeps its bits, so that written poses read back the same.
 RigidTransform rigid_from_matrix(const Eigen::Matrix4d& matrix);
 
-/// The same of any 4x4 matrix; InputError that begins with `where` when it is not rigid.
+/// The same for any 4x4 matrix. Throws InputError that begins with `where` when it is not rigid.
 RigidTransform rigid_or_throw(const Eigen::Matrix4d& matrix, const std::string& where);
 
-/// The pose of six numbers (rx_deg ... tz_mm) relative to `frame`. InputError, beginning with
-/// `where`, when it is not finite or leads more than a kilometre away (rigidity_problems()).
+/// The pose of six numbers (rx_deg ... tz_mm) relative to `frame`. Throws InputError, beginning
+/// with `where`, when it is not finite or leads more than a kilometre away (rigidity_problems()).
 RigidTransform pose_of_deg_and_mm(const PoseFrame& frame,
                                   const std::array<double, 6>& values,
                                   const std::string& where);
 
-/// The smallest rotation that takes the direction of `from` to that of `to`; neither is zero. For
-/// directions within 1.4e-6 rad of opposite, half a turn about a perpendicular axis. Orthonormal to
-/// 1e-11.
+/// The smallest rotation that takes the direction of `from` to that of `to`; neither is zero.
+/// Directions within 1.4e-6 rad of opposite give half a turn about a perpendicular axis.
+/// Orthonormal to 1e-11.
 Eigen::Matrix3d rotation_between(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
 /// Angle of the rotation a^-1 b, in rad.

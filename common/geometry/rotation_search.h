@@ -17,7 +17,7 @@ struct RotationMaximum {
   Eigen::Vector3d angles;
   double value;
 
-  /// Whether `candidate` at `at` is larger, which it then takes.
+  /// Takes `candidate` at `at` if it is larger, and says whether it did.
   bool takes(const Eigen::Vector3d& at, double candidate) {
     if (!(candidate > value)) return false;
     value = candidate;
@@ -26,7 +26,7 @@ struct RotationMaximum {
   }
 };
 
-/// The grid of rotations that a search begins with: holds the box's corners, edges and centre.
+/// The grid of rotations where a search begins. It holds the box's corners, edges and centre.
 struct RotationGrid {
   Eigen::Vector3d low;
   Eigen::Vector3d high;
@@ -39,7 +39,7 @@ struct RotationGrid {
     for (int axis = 0; axis < 3; ++axis) {
       const double width = high[axis] - low[axis];
       const int count = std::max(8, static_cast<int>(std::ceil(width / kWidestStepRad)));
-      // An axis without room needs no nodes beside its first.
+      // An axis without room needs only its first node.
       intervals[static_cast<std::size_t>(axis)] = width > 0.0 ? count : 0;
       step[axis] = width / count;
     }
@@ -77,7 +77,7 @@ double refined(RotationMaximum best, const RotationGrid& grid, const Objective& 
 }
 
 /// Maximises smooth functions over the rotation box, each from its best node of one grid. At large
-/// angles extremes lie inside the box, so corners alone would not do. `turned(angles)` computes
+/// angles extremes lie inside the box, so corners alone are not enough. `turned(angles)` computes
 /// what the functions share at a rotation; `value(shared, i)` is function i of `count`.
 template <typename Turned, typename Value>
 std::vector<double> maxima_over_rotations(const MotionRange& range,

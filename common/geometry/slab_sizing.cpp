@@ -17,12 +17,11 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// All translations of a range: about its middle, to both sides by at most `half_mm` along each
-/// axis.
+/// All translations of a range, as its middle and up to `half_mm` to both sides along each axis.
 struct TranslationBox {
   Eigen::Vector3d middle_mm;
   double largest_half_mm = 0.0;
-  Eigen::Vector3d share;  ///< of it, along each axis
+  Eigen::Vector3d share;  ///< share of half_mm along each axis
 
   explicit TranslationBox(const MotionRange& range)
       : middle_mm(0.5 * (range.low.translation_mm + range.high.translation_mm)),
@@ -32,7 +31,7 @@ struct TranslationBox {
     if (largest_half_mm > 0.0) share = half / largest_half_mm;
   }
 
-  /// Most that a value which changes by `slope` per mm can grow from the middle on.
+  /// How much a value that changes by `slope` per mm can grow from the middle on, at most.
   [[nodiscard]] double largest_growth(const Eigen::Vector3d& slope) const {
     return slope.cwiseAbs().cwiseProduct(share).sum() * largest_half_mm;
   }
@@ -95,15 +94,16 @@ class MovingCamera {
     return at;
   }
 
-  /// Charges a source beyond a half-space `price` per mm of normal . source - offset, and credits
+  /// Charges a source `price` per mm of normal . source - offset beyond a half-space, and credits
   /// one within it.
   struct PricedRegion {
     HalfSpace sources;  ///< slab frame
     double price = 0.0;
   };
 
-  /// Largest coordinate sign * x (axis 0) or sign * z (axis 2), less its price, at which the ray to
-  /// detector corner `corner` can meet the plane y = plane_y, over all translations in range.
+  /// Largest coordinate sign * x (axis 0) or sign * z (axis 2), less the price of the source, at
+  /// which the ray to detector corner `corner` can meet the plane y = plane_y, over all
+  /// translations in range.
   [[nodiscard]] double extreme_hit(const Turned& at,
                                    std::size_t corner,
                                    double plane_y_mm,
@@ -111,7 +111,8 @@ class MovingCamera {
                                    double sign,
                                    const PricedRegion& region) const {
     const Eigen::Vector3d& direction = at.corner_directions[corner];
-    constexpr double kSteepest = -0.05;  // rays within 3 degrees of the planes make them boundless
+    constexpr double kSteepest =
+        -0.05;  // rays within 3 degrees of the planes would make them boundless
     if (!(direction.y() < kSteepest * direction.norm()))
       throw InputError("max_rotation_deg",
                        std::to_string(range_.max_rotation_rad() * kDegPerRad),
@@ -139,15 +140,15 @@ class MovingCamera {
                 .front();
   }
 
-  /// Where rays to any detector corner can meet the planes, over the whole motion box.
+  /// Where rays to detector corners can meet the planes, over the whole motion box.
   [[nodiscard]] std::vector<PlaneExtent> hits(std::span<const double> plane_y_mm) const {
     return priced_hits(plane_y_mm, [](double /*plane_y*/) { return PricedRegion{}; });
   }
 
-  /// The same of rays whose source is in a half-space (slab frame). For any price not below 0 the
-  /// largest hit less its price, over all sources, is a bound of those within (Lagrange's dual);
-  /// the least bound over prices is taken. It is nearly tight at the price at which a source that
-  /// moves about a point of y = 0 gains nothing.
+  /// The same for rays whose source is in a half-space (slab frame). Any price of at least 0 gives
+  /// a bound (Lagrange's dual): the largest hit less its price, over all sources, bounds the hits
+  /// of those within. The least bound over prices is taken. It is nearly tight at the price at
+  /// which a source that moves about a point of y = 0 gains nothing.
   [[nodiscard]] std::vector<PlaneExtent> hits_from(const HalfSpace& sources,
                                                    std::span<const double> plane_y_mm) const {
     constexpr std::array kPrices = {0.1, 0.25, 0.45, 0.7, 0.85, 0.95, 1.0, 1.05, 1.15, 1.3};
@@ -206,8 +207,8 @@ class MovingCamera {
   TranslationBox translations_;
 };
 
-/// Vertices of the part of a box (slab frame) with y in [low, high]: its corners inside and its
-/// edges' cuts.
+/// Vertices of the part of a box (slab frame) with y in [low, high]: the corners inside, and where
+/// edges are cut.
 std::vector<Eigen::Vector3d> clipped_box(const std::array<Eigen::Vector3d, 8>& corners,
                                          double y_low,
                                          double y_high) {
@@ -237,7 +238,7 @@ NodeRange even_aligned_range(const GridAxis& axis, double low_mm, double high_mm
   return {first, std::min(last + 1, axis.nodes) - first};
 }
 
-/// Crops a slab to the shadow of `vertices` seen from the (u,v) rectangle's corners; both maps are
+/// Crops a slab to the shadow of `vertices` seen from the (u,v) rectangle's corners. Both maps are
 /// projective, so corners decide.
 void crop_to_shadow(const LightSlab& light_slab,
                     const std::vector<Eigen::Vector3d>& vertices,
@@ -271,8 +272,8 @@ void refuse_source_inside_ct(double highest_ct_y_mm, double lowest_source_y_mm) 
 }
 
 std::vector<PlaneExtent> with_margin(std::vector<PlaneExtent> extents) {
-  // Rounding and the search's final step stay far below this; it also keeps a plane that is a
-  // single point (no motion) from having no size.
+  // Rounding and the search's final step stay far below this margin. It also gives a size to a
+  // plane that is a single point, when nothing moves.
   for (PlaneExtent& extent : extents) {
     const double margin =
         kExtentMargin *
@@ -295,7 +296,7 @@ void widen(std::vector<PlaneExtent>& extents, const std::vector<PlaneExtent>& ot
   }
 }
 
-/// Extents on planes of the rays whose source is in all of `sources` (ct frame), with a margin.
+/// Extents on planes of the rays whose source lies in all of `sources` (ct frame), with a margin.
 std::vector<PlaneExtent> extents_from(const CameraGeometry& camera,
                                       const PoseFrame& frame,
                                       const MotionRange& range,
@@ -312,7 +313,7 @@ std::vector<PlaneExtent> extents_from(const CameraGeometry& camera,
     for (std::size_t i = 0; i < extents.size(); ++i)
       extents[i] = common_part(extents[i], reached[i]);
   }
-  // Where no source of the range is within, the bounds may have crossed; a point is left then.
+  // The bounds may have crossed where no source of the range is within. A point is left then.
   for (PlaneExtent& extent : extents) {
     extent.x_high_mm = std::max(extent.x_low_mm, extent.x_high_mm);
     extent.z_high_mm = std::max(extent.z_low_mm, extent.z_high_mm);
@@ -320,8 +321,8 @@ std::vector<PlaneExtent> extents_from(const CameraGeometry& camera,
   return with_margin(extents);
 }
 
-/// Fewest nodes of an axis, an even number and no more than it has, that stand no farther apart
-/// than those of `other`.
+/// The fewest nodes for an axis whose nodes stand no farther apart than those of `other`: an even
+/// number, no more than the axis has.
 int nodes_at_most_apart(const GridAxis& axis, const GridAxis& other) {
   const int intervals = static_cast<int>(std::ceil(axis.length_mm() / other.spacing_mm()));
   return std::min(axis.nodes, std::max(2, (intervals + 2) / 2 * 2));
@@ -382,9 +383,9 @@ LightSlab make_light_slab(const CameraGeometry& camera,
     corner = light_slab.slab_from_ct * corner;
     light_slab.attenuation_end_y_mm = std::max(light_slab.attenuation_end_y_mm, corner.y());
   }
-  const auto refuse_inside = [&](const CameraGeometry& of) {
+  const auto refuse_inside = [&](const CameraGeometry& moving) {
     refuse_source_inside_ct(light_slab.attenuation_end_y_mm,
-                            lowest_source_y_mm(of, frame, range, light_slab.slab_from_ct));
+                            lowest_source_y_mm(moving, frame, range, light_slab.slab_from_ct));
   };
   refuse_inside(camera);
   for (const CameraGeometry& other : more_cameras) refuse_inside(other);

@@ -23,25 +23,25 @@ struct PlaneExtent {
 inline constexpr double kExtentMargin = 1e-6;
 
 /// Where all rays of a camera can meet the planes y = `plane_y_mm` of the slab frame while the CT
-/// moves within `range` (generalises eq. (3), Sec. II-C: true detector corners, any nominal pose,
-/// rotations about room axes). For a fixed rotation the hit point is linear in the translation and
-/// projective in the detector point, so corners decide both; over rotations the maximum is searched
-/// on a grid and refined. Extents include a safety margin, kExtentMargin. Throws InputError
-/// when a ray can become parallel to the planes (range too large). \test
-/// SlabSizing.NoInRangeRayMissesAPlane
+/// moves within `range`. Generalises eq. (3), Sec. II-C: true detector corners, any nominal pose,
+/// rotations about room axes.
+/// For a fixed rotation the hit point is linear in the translation and projective in the detector
+/// point, so corners decide both. Over rotations the maximum is searched on a grid and refined.
+/// Extents include a safety margin, kExtentMargin. Throws InputError when a ray can become parallel
+/// to the planes (range too large). \test SlabSizing.NoInRangeRayMissesAPlane
 std::vector<PlaneExtent> extents_on_planes(const CameraGeometry& camera,
                                            const PoseFrame& frame,
                                            const MotionRange& range,
                                            std::span<const double> plane_y_mm);
 
-/// The same in any slab frame: that of a field made for another camera or about another pose.
+/// The same in any slab frame, such as that of a field made for another camera or pose.
 std::vector<PlaneExtent> extents_on_planes(const CameraGeometry& camera,
                                            const PoseFrame& frame,
                                            const MotionRange& range,
                                            std::span<const double> plane_y_mm,
                                            const RigidTransform& slab_from_ct);
 
-/// Lowest y that the X-ray source can take in a slab frame while the CT moves within `range`.
+/// Lowest y that the X-ray source can reach in a slab frame while the CT moves within `range`.
 double lowest_source_y_mm(const CameraGeometry& camera,
                           const PoseFrame& frame,
                           const MotionRange& range,
@@ -67,16 +67,16 @@ struct LightSlabSpec {
   std::vector<double> slab_boundaries_y_mm;  ///< K - 1 inner boundaries, ascending; empty for K = 1
   std::vector<double> st_plane_y_mm = {0.0};  ///< one per slab, in the order of ascending y
   /// The field holds only those of the range's poses whose source lies in all of these (ct frame);
-  /// none means all poses. For further cameras it holds all poses. Where these leave less than the
+  /// none means all poses. For further cameras it holds all poses. If these leave less than the
   /// whole (u,v) plane, its shorter side gets fewer nodes, no farther apart than along the other.
   std::vector<HalfSpace> sources;
 };
 
-/// The complete geometry of a field, every slab cropped to the shadow that `attenuating_corners_ct`
-/// (corners of convex bodies that hold all attenuation, ct frame) can throw from the (u,v)
-/// rectangle, plus one node, even-aligned. The planes hold the rays of `more_cameras` over the same
-/// range, too. Throws InputError when a source can come to lie inside the CT's depth range or the
-/// range is too large.
+/// The complete geometry of a field. Every slab is cropped to the shadow that
+/// `attenuating_corners_ct` (corners of convex bodies that hold all attenuation, ct frame) can
+/// throw from the (u,v) rectangle, plus one node, even-aligned. The planes also hold the rays of
+/// `more_cameras` over the same range. Throws InputError when a source can enter the CT's depth
+/// range, or when the range is too large.
 LightSlab make_light_slab(const CameraGeometry& camera,
                           const PoseFrame& frame,
                           const MotionRange& range,

@@ -63,7 +63,7 @@ TreBounds TreBounder::bounds(const RigidTransform& room_from_ct,
     bounds.low_mm += cell.share * std::sqrt(squared_mm2);
     bounds.high_mm += cell.share * std::sqrt(squared_mm2 + spread_mm2);
   }
-  // Far above the rounding of a mean over any number of points, far below what matters.
+  // This is far above the rounding of a mean over any number of points, and far below what matters.
   constexpr double kRounding = 1e-9;
   return {bounds.low_mm * (1.0 - kRounding), bounds.high_mm * (1.0 + kRounding)};
 }

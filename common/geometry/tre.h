@@ -21,10 +21,10 @@ struct TreBounds {
   double high_mm = 0.0;
 };
 
-/// Bounds mean_tre_mm() without a pass over all points, from cells of points: below by the distance
+/// Bounds mean_tre_mm() from cells of points, without a pass over all points: below by the distance
 /// at each cell's mean (Jensen), above by its root mean square distance. With four cells along each
-/// axis the bounds lie within a few percent; with more they are closer and take longer. For a pure
-/// translation they coincide. \test MeanTre.LiesWithinItsBounds
+/// axis the bounds lie within a few percent; more cells are tighter and slower. For a pure
+/// translation the bounds coincide. \test MeanTre.LiesWithinItsBounds
 class TreBounder {
  public:
   /// Throws InputError without points.

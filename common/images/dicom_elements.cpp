@@ -36,7 +36,7 @@ constexpr DicomTag kPixelData = {0x7fe0, 0x0010};
 constexpr DicomTag kLutDescriptor = {0x0028, 0x3002};
 constexpr DicomTag kLutData = {0x0028, 0x3006};
 constexpr std::uint64_t kLongestLut = 1U << 18;
-/// Values within sequences that one file may have: a moving C-arm has tens per frame.
+/// How many values within sequences one file may have. A moving C-arm has tens per frame.
 constexpr std::size_t kMostNestedValues = std::size_t{1} << 20;
 
 /// Sequences whose items are kept: Modality LUT; shared and per-frame functional groups, and of
@@ -66,7 +66,7 @@ bool is_one_of(std::string_view forms, std::string_view form) {
   return false;
 }
 
-/// Bytes of one number of a binary form; 1 for text.
+/// Bytes of one number in a binary form; 1 for text.
 std::uint32_t unit_bytes(std::string_view form) {
   if (form == "US" || form == "SS") return 2;
   if (form == "UL" || form == "SL" || form == "FL" || form == "AT") return 4;
@@ -86,8 +86,8 @@ struct Encoding {
   bool is_big_endian = false;
 };
 
-/// The form of those elements that are read as binary numbers in implicit files, where forms are
-/// not written; empty for the others.
+/// The form of elements that are read as binary numbers in implicit files, which do not state
+/// forms. Empty for the others.
 std::string_view implicit_form(DicomTag tag) {
   constexpr std::array<std::uint16_t, 9> kUnsigned = {
       0x0002, 0x0010, 0x0011, 0x0100, 0x0101, 0x0102, 0x0103, 0x0120, 0x0121};
@@ -185,7 +185,7 @@ class DicomWalker {
     if (!syntax.empty() && !syntax.starts_with("1.2.840.10008.1.2."))
       throw InputError("transfer syntax", syntax, "is not known", path_);
     if (!syntax.empty() || size_ - at_ < 6) return {};
-    // Without file header: explicit when a known form stands behind the first tag.
+    // A file without file header is explicit when a known form stands behind its first tag.
     const std::uint64_t start = at_;
     const std::string first = take(6, size_);
     at_ = start;
@@ -252,7 +252,7 @@ class DicomWalker {
     return header.form.empty() && into != nullptr && is_kept_sequence(header.tag);
   }
 
-  /// Where the items of a sequence go; nullptr: they are passed over.
+  /// Where the items of a sequence go; nullptr where they are skipped.
   static std::vector<DicomValues>* kept_sequence(DicomTag tag, DicomValues* into) {
     return into != nullptr && is_kept_sequence(tag) ? &into->sequences_[tag] : nullptr;
   }
@@ -434,7 +434,7 @@ bool is_marked_dicom(const fs::path& path) {
 }
 
 bool may_be_bare_dicom(const fs::path& path) {
-  // Such files begin directly with an element of group 0002 or 0008.
+  // Files without the mark begin directly with an element of group 0002 or 0008.
   std::ifstream file = open_input_file(path);
   std::array<unsigned char, 4> start{};
   file.read(reinterpret_cast<char*>(start.data()), start.size());

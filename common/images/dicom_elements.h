@@ -30,13 +30,13 @@ class DicomValues {
  public:
   /// An element as text without padding; numbers in binary are written out. Empty when absent.
   [[nodiscard]] std::string text(DicomTag tag) const;
-  /// Backslash-separated numbers; empty when the element is absent, InputError naming `name` and
-  /// `file` when it holds anything but finite numbers.
+  /// Backslash-separated numbers; empty when the element is absent. Throws InputError naming `name`
+  /// and `file` when it holds anything but finite numbers.
   [[nodiscard]] std::vector<double> numbers(DicomTag tag,
                                             const char* name,
                                             const std::string& file) const;
-  /// Of the sequences that readers ask for: Modality LUT, functional groups and what they hold.
-  /// Empty when absent.
+  /// Items of the sequences that readers ask for: Modality LUT, functional groups and what they
+  /// hold. Empty when absent.
   [[nodiscard]] const std::vector<DicomValues>& items(DicomTag sequence) const;
   /// The only or first item of a sequence; an empty one when it is absent.
   [[nodiscard]] const DicomValues& item(DicomTag sequence) const;
@@ -48,28 +48,28 @@ class DicomValues {
 };
 
 /// The top-level elements of a DICOM file, read by walking its structure to the end of the pixel
-/// data. GDCM's own parser is not used: of the copies of a file that are cut within their data set,
-/// version 3.0.21 ends the process on two thirds and reads most others without their pixels.
+/// data. GDCM's own parser is not used. On copies of a file that are cut within their data set,
+/// version 3.0.21 ends the process for two thirds, and reads most others without their pixels.
 class DicomElements {
  public:
-  /// FileError when the file is cut short or its structure is broken; InputError when its transfer
-  /// syntax is not supported (deflated, unknown).
+  /// Throws FileError when the file is cut short or its structure is broken, InputError when its
+  /// transfer syntax is not supported (deflated, unknown).
   static DicomElements read(const std::filesystem::path& path);
 
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-  /// Whether the element is there, whatever it holds; sequences, too.
+  /// Whether the element is there, whatever it holds. Includes sequences.
   [[nodiscard]] bool has(DicomTag tag) const { return tags_.contains(tag); }
   [[nodiscard]] bool has_pixels() const { return !pixel_parts_.empty(); }
   [[nodiscard]] bool has_compressed_pixels() const { return has_compressed_pixels_; }
   [[nodiscard]] bool is_big_endian() const { return is_big_endian_; }
-  /// Whether pixels of 8 bits stand in words of two, whose bytes the byte order turns round.
+  /// Whether pixels of 8 bits stand in words of two, whose bytes the byte order swaps.
   [[nodiscard]] bool has_pixel_words() const { return has_pixel_words_; }
-  /// Where pixel data stand: one part, or the fragments of an encoded stream (the first is its
-  /// offset table).
+  /// Where the pixel data are: one part, or the fragments of an encoded stream, whose first is its
+  /// offset table.
   [[nodiscard]] const std::vector<DicomPart>& pixel_parts() const { return pixel_parts_; }
   /// Bytes of all parts.
   [[nodiscard]] std::uint64_t pixel_bytes() const;
-  /// As DicomValues, of the top level.
+  /// As in DicomValues, at the top level.
   [[nodiscard]] std::string text(DicomTag tag) const { return values_.text(tag); }
   [[nodiscard]] std::vector<double> numbers(DicomTag tag, const char* name) const {
     return values_.numbers(tag, name, path_.string());
@@ -88,25 +88,25 @@ class DicomElements {
   std::vector<DicomPart> pixel_parts_;
 };
 
-/// An element of one frame (from 1) of an enhanced file: of the macro's sequence in the frame's
-/// functional groups, else in the shared ones, else nullptr. Files without functional groups have
-/// none.
+/// An element of one frame (from 1) of an enhanced file. It comes from the macro's sequence in the
+/// frame's functional groups, else from the shared ones, else it is nullptr. Files without
+/// functional groups have none.
 const DicomValues* functional_group(const DicomElements& header, int frame, DicomTag macro);
 
-/// Column, row (mm), which DICOM states as "row\column"; none when the element is absent.
+/// Column, row (mm), which DICOM states as "row\column"; none when the element is absent. Throws
 /// InputError naming `name` and `file` when it is not two positive numbers.
 std::optional<Eigen::Vector2d> dicom_spacing_mm(const DicomValues& values,
                                                 DicomTag tag,
                                                 const char* name,
                                                 const std::string& file);
 
-/// ImagerPixelSpacing (column, row; of the detector's plane) of a frame (from 1): that of its
-/// functional groups, else of the top level; none when the file states none. InputError when it is
-/// not two positive numbers.
+/// ImagerPixelSpacing (column, row; on the detector's plane) of a frame (from 1). It comes from the
+/// frame's functional groups, else from the top level; none when the file states none. Throws
+/// InputError when it is not two positive numbers.
 std::optional<Eigen::Vector2d> imager_spacing_mm(const DicomElements& header, int frame);
 
-/// True for a file with the mark of DICOM, or without its preamble as old files are. Reads a few
-/// bytes only.
+/// True for a file with the mark of DICOM, or without its preamble, as old files are. Reads only a
+/// few bytes.
 bool is_marked_dicom(const std::filesystem::path& path);
 bool may_be_bare_dicom(const std::filesystem::path& path);
 

@@ -78,15 +78,15 @@ void read_bit_layout(const DicomElements& header, DicomPixelLayout& layout) {
   layout.is_signed = required_integer(header, {0x0028, 0x0103}, "PixelRepresentation", 0, 1) == 1;
 }
 
-/// The lowest `bits` of a number, with the sign that they have.
+/// The lowest `bits` of a number, with the sign that these bits have.
 std::int64_t number_of_bits(std::int64_t number, int bits, bool is_signed) {
   const std::int64_t range = std::int64_t{1} << bits;
   const std::int64_t value = number & (range - 1);
   return is_signed && value >= range / 2 ? value - range : value;
 }
 
-/// Files state it as signed or not whatever their pixels are, so its bits count. The limit may be
-/// the lower end (PS3.3, C.7.5.1.1.2).
+/// Files state padding as signed or not, whatever their pixels are, so only its bits count. The
+/// limit may be the lower end (PS3.3, C.7.5.1.1.2).
 void read_padding(const DicomElements& header, DicomPixelLayout& layout) {
   if (header.text(kPaddingValue).empty()) return;
   const auto stored = [&](DicomTag tag, const char* name) {
@@ -119,8 +119,9 @@ void check_bytes(const DicomElements& header, const DicomPixelLayout& layout) {
                     "pixel data",
                     std::to_string(expected) + " bytes",
                     std::to_string(header.pixel_bytes()));
-  // No lossless codec packs an image with noise this tightly, but a blank one takes next to
-  // nothing. So memory beyond that of any detector's frame is not taken on the header's word.
+  // No lossless codec packs an image with noise this tightly, while a blank one takes next to
+  // nothing. Memory beyond that of any detector's frame is therefore not allocated on the header's
+  // word.
   constexpr std::uint64_t kMaxCompression = 1000;
   constexpr std::size_t kLargestBlankFrame = std::size_t{1} << 27;
   if (decoded_bytes(layout) > kLargestBlankFrame &&
@@ -141,7 +142,7 @@ std::vector<char> part_of_file(const std::filesystem::path& path, const DicomPar
 }
 
 /// The fragments of a frame. The first part of the pixels is the table of the frames' offsets,
-/// which may be empty: then every frame is one fragment, or there is one frame.
+/// which may be empty. Then every frame is one fragment, or there is only one frame.
 std::vector<DicomPart> fragments_of_frame(const DicomPixelLayout& layout) {
   constexpr std::uint64_t kItemHeadBytes = 8;
   const std::vector<DicomPart>& parts = layout.header.pixel_parts();
@@ -187,7 +188,7 @@ gdcm::TransferSyntax::TSType compression_of(const DicomPixelLayout& layout) {
   return type;
 }
 
-/// GDCM's image of what the file says, made without its parser.
+/// GDCM's image of what the file states, made without its parser.
 gdcm::Image compressed_image(const DicomPixelLayout& layout,
                              gdcm::TransferSyntax::TSType compression,
                              const std::vector<std::vector<char>>& fragments) {
@@ -215,8 +216,8 @@ gdcm::Image compressed_image(const DicomPixelLayout& layout,
   return image;
 }
 
-/// By GDCM, whose JPEG decoders end the process on damaged frames, version 3.0.21 by an assertion
-/// (gdcmJPEGBITSCodec.hxx:782). So it decodes in a copy of the process.
+/// Decodes by GDCM in a copy of the process, because its JPEG decoders end the process on damaged
+/// frames. Version 3.0.21 does so by an assertion (gdcmJPEGBITSCodec.hxx:782).
 std::vector<char> decompressed(const DicomPixelLayout& layout) {
   const gdcm::TransferSyntax::TSType compression = compression_of(layout);
   std::vector<std::vector<char>> fragments;
@@ -240,7 +241,7 @@ struct StoredPixels {
 };
 
 /// Cuts the stored bits out of the allocated ones and extends the sign. Padding that does not fit
-/// into the stored bits is looked for in all of them.
+/// into the stored bits is compared with all bits.
 StoredPixels stored_pixels(const std::vector<char>& raw,
                            bool is_big_endian,
                            const DicomPixelLayout& layout) {
@@ -273,8 +274,7 @@ StoredPixels stored_pixels(const std::vector<char>& raw,
   return pixels;
 }
 
-/// Whether other pixels hold values below and above those of padding, against what DICOM says of
-/// it.
+/// Whether other pixels hold values below and above the padding, contrary to what DICOM says of it.
 bool is_amid_data(const StoredPixels& pixels, const DicomPixelLayout& layout) {
   bool has_lower = false;
   bool has_higher = false;
@@ -286,7 +286,7 @@ bool is_amid_data(const StoredPixels& pixels, const DicomPixelLayout& layout) {
   return has_lower && has_higher;
 }
 
-/// Leaves of the padding what is connected (4 neighbours) with the picture's edge.
+/// Keeps only the padding that is connected (4 neighbours) with the picture's edge.
 std::vector<bool> part_at_edge(const std::vector<bool>& is_padding, std::size_t columns) {
   const std::size_t count = is_padding.size();
   std::vector<bool> found(count);

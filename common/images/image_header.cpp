@@ -79,7 +79,7 @@ std::string_view format_name(ImageFormat format) {
 std::optional<ImageFormat> sniff_image_format(const fs::path& path) {
   const std::string start = read_prefix(path, 1024);
   const std::string_view bytes(start);
-  // First: its preamble may be the beginning of a TIFF file (PS3.10, 7.1).
+  // DICOM comes first, because its preamble may be the beginning of a TIFF file (PS3.10, 7.1).
   if (bytes.size() >= 132 && bytes.substr(128, 4) == "DICM") return ImageFormat::Dicom;
   if (bytes.starts_with("NRRD00")) return ImageFormat::Nrrd;
   if (bytes.starts_with("\x89PNG\r\n\x1a\n")) return ImageFormat::Png;

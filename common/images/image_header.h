@@ -18,32 +18,34 @@ enum class ImageFormat { MetaImage, Nifti, Nrrd, Png, Tiff, Dicom };
 
 std::string_view format_name(ImageFormat format);
 
-/// The format of a file by its first bytes; nullopt when it is none of them. FileError when it
+/// The format of a file by its first bytes; nullopt for an unknown one. Throws FileError when it
 /// cannot be read.
 std::optional<ImageFormat> sniff_image_format(const std::filesystem::path& path);
 
-/// What a file that the project does not read looks like, for messages: " (it begins as a JPEG
-/// picture does)", whatever its name; empty when that is not known.
+/// What an unsupported file looks like, whatever its name, for messages: " (it begins as a JPEG
+/// picture does)". Empty when that is unknown.
 std::string foreign_content(const std::filesystem::path& path);
 
-/// Of axes from orthonormal, the cosine between two of them or the error of a length: what cosines
-/// of three decimals leave. A grid within it is taken as the nearest orthonormal one.
+/// Deviation of axes from orthonormal that is allowed: the cosine between two of them, or the error
+/// of a length. Cosines of three decimals leave this much. A grid within it is taken as the nearest
+/// orthonormal one.
 inline constexpr double kMaxDirectionError = 1e-3;
 
-/// What can be said of an image file before a library is trusted with it.
+/// What can be told of an image file before a library is trusted with it.
 struct ImageHeader {
   ImageFormat format = ImageFormat::MetaImage;
-  /// Without values, of the type that they are read as; nothing for PNG, TIFF and DICOM.
+  /// The image without values, of the type as which they are read. Empty for PNG, TIFF and DICOM.
   RawImage image;
   std::uint64_t payload_offset = 0;  ///< where the (compressed) voxels begin
   std::uint64_t skip_bytes = 0;      ///< in front of the voxels, after decompression
   bool compressed = false;
-  /// Of the compressed stream, where the header states them.
+  /// Bytes of the compressed stream, where the header states them.
   std::optional<std::uint64_t> compressed_bytes;
   std::filesystem::path data_file;  ///< the file that holds the voxels
-  /// Of one channel, as stored. This and what follows is known of MetaImage, NRRD and NIfTI only.
+  /// Type of one channel, as stored. This and what follows is known only for MetaImage, NRRD and
+  /// NIfTI.
   ValueType value_type = ValueType::Int16;
-  bool is_byte_swapped = false;  ///< against this machine
+  bool is_byte_swapped = false;  ///< in the opposite order to this machine's
   bool is_rescaled = false;      ///< values are stored * slope + intercept
   double slope = 1.0;
   double intercept = 0.0;
@@ -51,15 +53,15 @@ struct ImageHeader {
   bool has_spacing = true;
   std::vector<std::string> warnings;
 
-  /// Of one voxel with all its channels, as stored.
+  /// Bytes of one voxel with all its channels, as stored.
   [[nodiscard]] std::size_t voxel_bytes() const {
     return value_bytes(value_type) * static_cast<std::size_t>(image.channels);
   }
 };
 
-/// Reads and checks the header of a MetaImage, NRRD or NIfTI-1 file without allocating by what it
-/// says. FileError when it is damaged, its extents overflow or its encoding is not supported;
-/// InputError for wrong units or spacing.
+/// Reads and checks the header of a MetaImage, NRRD or NIfTI-1 file, and allocates nothing by what
+/// it says. Throws FileError when it is damaged, its extents overflow or its encoding is not
+/// supported, InputError for wrong units or spacing.
 ImageHeader read_image_header(const std::filesystem::path& path, ImageFormat format);
 
 }  // namespace af

@@ -18,8 +18,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// Decimal points in this thread, whatever locale the host program has set: NrrdIO prints numbers
-/// as C does.
+/// Sets decimal points in this thread, whatever locale the host program has set, because NrrdIO
+/// prints numbers as C does.
 class PointLocale {
  public:
   PointLocale() : point_(newlocale(LC_ALL_MASK, "C", nullptr)), before_(uselocale(point_)) {}
@@ -35,7 +35,7 @@ class PointLocale {
   locale_t before_;
 };
 
-/// ITK's messages are the program's business, not the terminal's: what matters comes as exceptions.
+/// Keeps ITK's messages off the terminal. What matters comes as exceptions.
 class SilentWindow : public itk::OutputWindow {
  public:
   using Self = SilentWindow;
@@ -51,7 +51,7 @@ void silence_itk() {
   (void)done;
 }
 
-/// The writer itself, not one found through ITK's global factories.
+/// The writer itself, rather than one found through ITK's global factories.
 itk::ImageIOBase::Pointer make_image_io(ImageFormat format) {
   silence_itk();
   switch (format) {

@@ -7,7 +7,8 @@
 
 namespace af {
 
-/// Writes an image by ITK, which does not notice a full disk. FileError for what it notices.
+/// Writes an image by ITK, which does not notice a full disk. Throws FileError for what it does
+/// notice.
 void write_by_itk(const RawImage& image, const std::filesystem::path& file, ImageFormat format);
 
 }  // namespace af

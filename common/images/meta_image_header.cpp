@@ -68,7 +68,7 @@ bool is_true(const TextHeader& header, const std::string& key, bool fallback) {
   return (*value)[0] == 'T' || (*value)[0] == 't' || (*value)[0] == '1';
 }
 
-/// The numbers of the first of some keys that the header has; none when it has none of them.
+/// The numbers of the first of some keys that the header has; none when it has none of them. Throws
 /// FileError when they are not `expected` numbers, or another of the keys has others.
 std::vector<double> meta_numbers(const TextHeader& header,
                                  std::initializer_list<const char*> keys,
@@ -112,7 +112,7 @@ void read_meta_place(const TextHeader& text, ImageHeader& header) {
     throw InputError("DistanceUnits", "'" + *unit + "'", "lengths must be in mm", text.path);
 }
 
-/// InputError where values are not those that are stored; ITK reads them as if they were.
+/// Throws InputError where values differ from those stored, which ITK ignores.
 void check_meta_intensity(const TextHeader& text) {
   constexpr std::array<std::pair<const char*, double>, 2> kNone = {
       {{"ElementToIntensityFunctionSlope", 1.0}, {"ElementToIntensityFunctionOffset", 0.0}}};
@@ -130,8 +130,8 @@ bool is_meta_byte_swapped(const TextHeader& header) {
   return element != (std::endian::native == std::endian::big);
 }
 
-/// Where the voxels begin. HeaderSize counts from the beginning of their file, -1 means its end
-/// less the voxels.
+/// Where the voxels begin. HeaderSize counts from the beginning of their file; -1 means as far
+/// before its end as the voxels need.
 std::uint64_t meta_payload_offset(const TextHeader& text,
                                   const ImageHeader& header,
                                   bool is_local,
@@ -151,8 +151,8 @@ std::uint64_t meta_payload_offset(const TextHeader& text,
   return file_bytes - payload;
 }
 
-/// The length of the compressed voxels. MetaIO needs it where they stand behind the header, and
-/// reads zeros without it.
+/// The length of the compressed voxels. MetaIO needs it where they follow the header, and reads
+/// zeros without it.
 std::optional<std::uint64_t> meta_compressed_bytes(const TextHeader& header, bool is_local) {
   if (header.find("CompressedDataSize") == nullptr && !is_local) return std::nullopt;
   (void)header.require("CompressedDataSize");

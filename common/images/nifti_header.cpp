@@ -20,12 +20,12 @@ namespace {
 
 constexpr float kMaxOrientation = 1e6f;
 constexpr float kMaxSlope = 1e6f;
-/// A quaternion in single precision near half a turn is wrong by sqrt(6e-8) rad, by 0.06 mm at the
+/// A quaternion in single precision near half a turn is off by sqrt(6e-8) rad, or 0.06 mm at the
 /// corners of a volume 500 mm wide.
 constexpr double kMaxPlaceDifferenceMm = 0.05;
 constexpr std::size_t kNifti2HeaderBytes = 540;
 
-/// A voxel's type: of each channel, and how many there are.
+/// A voxel's type: the type of each channel, and how many there are.
 struct NiftiType {
   ValueType type = ValueType::Int16;
   std::uint64_t channels = 1;
@@ -50,7 +50,7 @@ NiftiType nifti_type(const std::string& path, int datatype) {
   return found->second;
 }
 
-/// Maps of voxel index to RAS+ mm: grids of spacing 1 whose axes are as long as voxels.
+/// Maps of voxel index to RAS+ mm, as grids of spacing 1 whose axes are as long as voxels.
 CtGrid qform_map(std::string_view raw, bool swapped) {
   const auto at = [&](std::size_t offset) {
     return static_cast<double>(number_at<float>(raw, offset, swapped));
@@ -78,12 +78,12 @@ CtGrid sform_map(std::string_view raw, bool swapped) {
   return map;
 }
 
-/// Along the axis, from the first voxel's centre to the last one's.
+/// Length along the axis, from the first voxel's centre to the last one's.
 double extent_mm(const ImageHeader& header, std::size_t axis, double spacing_mm) {
   return static_cast<double>(header.image.size[axis] - 1) * spacing_mm;
 }
 
-/// The sform's axes must be those of pixdim: a map that is flat, or of other lengths, is no grid.
+/// The sform's axes must be those of pixdim: a map that is flat, or has other lengths, is no grid.
 void check_lengths(const std::string& path, const ImageHeader& header, const CtGrid& sform) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const double length = sform.direction.col(static_cast<Eigen::Index>(axis)).norm();
@@ -97,8 +97,8 @@ void check_lengths(const std::string& path, const ImageHeader& header, const CtG
   }
 }
 
-/// Where a volume lies. Of two maps the sform counts when it leads to the scanner's coordinates
-/// (code 1), otherwise the qform, as ITK has it.
+/// Where a volume lies. The sform counts when it leads to the scanner's coordinates (code 1),
+/// otherwise the qform, as in ITK.
 void place_volume(const std::string& path,
                   std::string_view raw,
                   bool swapped,
@@ -125,7 +125,8 @@ void place_volume(const std::string& path,
     const Eigen::Vector3d unit = column.normalized();
     header.image.directions[axis].assign(unit.begin(), unit.end());
     header.image.origin_mm[axis] = lps_from_ras[i] * ras.origin_mm[i] + 0.0;  // no -0
-    // pixdim where the two agree to what tells CTs apart: both are rounded to single precision.
+    // Takes pixdim where the two agree to what tells CTs apart, because both are rounded to single
+    // precision.
     if (extent_mm(header, axis, std::abs(column.norm() - header.image.spacing_mm[axis])) >
         kSamePlaceMm)
       header.image.spacing_mm[axis] = column.norm();
@@ -148,7 +149,7 @@ void check_nifti_numbers(const std::string& path, std::string_view raw, bool swa
                        std::string("spacing ") + kPlausibleSpacing,
                        path);
   }
-  // Quaternion, offsets, and the rows of the sform.
+  // The quaternion, the offsets, and the rows of the sform.
   for (std::size_t offset = 256; offset < 328; offset += 4) {
     const float value = std::abs(number_at<float>(raw, offset, swapped));
     if (!(value < kMaxOrientation))
@@ -159,8 +160,8 @@ void check_nifti_numbers(const std::string& path, std::string_view raw, bool swa
   }
 }
 
-/// A slope of 0 means that there is none, and so does one that is not finite to the format's own
-/// library (nifti1_io.c, FIXED_FLOAT) and to nibabel, which writes NaN.
+/// A slope of 0 means that there is none. So does one that is not finite, for the format's own
+/// library (nifti1_io.c, FIXED_FLOAT) and for nibabel, which writes NaN.
 void read_rescale(const std::string& path,
                   std::string_view raw,
                   bool swapped,

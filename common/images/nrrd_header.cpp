@@ -124,8 +124,8 @@ std::vector<std::vector<double>> nrrd_directions(const TextHeader& header, std::
   return directions;
 }
 
-/// What turns coordinates of "left-anterior-superior" (or "LAS") and its like into LPS; none for
-/// spaces that are not the patient's, such as "scanner-xyz".
+/// The signs that turn coordinates of "left-anterior-superior" (or "LAS") and the like into LPS.
+/// None for spaces that are not the patient's, such as "scanner-xyz".
 std::optional<std::array<double, 3>> lps_signs(const std::string& space) {
   std::string letters = space;
   if (space.find('-') != std::string::npos) {

@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// An open file whose library's complaints are exceptions, which the library permits in place of
+/// An open file. Its library's complaints become exceptions, which the library permits instead of
 /// its long jumps.
 class PngFile {
  public:

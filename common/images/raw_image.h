@@ -14,8 +14,8 @@ namespace af {
 
 enum class ValueType { Int8, UInt8, Int16, UInt16, Int32, UInt32, Int64, UInt64, Float32, Float64 };
 
-/// An image as it is stored: axes in file order (the first is fastest), LPS mm, values in their
-/// own type.
+/// An image as it is stored: axes in file order (the first is fastest), LPS mm, values in their own
+/// type.
 struct RawImage {
   std::vector<std::size_t> size;
   std::vector<double> spacing_mm;
@@ -24,12 +24,12 @@ struct RawImage {
   int channels = 1;
   ValueType type = ValueType::Int16;
   std::vector<std::byte> values;
-  std::string note;  ///< what was done to the values; mostly nothing
+  std::string note;  ///< what was done to the values; usually empty
 
   [[nodiscard]] std::size_t voxel_count() const {
     return std::accumulate(size.begin(), size.end(), std::size_t{1}, std::multiplies<>());
   }
-  /// Axes without those of one voxel at the end, but `least` at least.
+  /// How many axes there are without those of one voxel at the end, but no fewer than `least`.
   [[nodiscard]] std::size_t used_axes(std::size_t least) const {
     std::size_t used = size.size();
     while (used > least && size[used - 1] == 1) --used;
@@ -37,7 +37,7 @@ struct RawImage {
   }
 };
 
-/// Calls `function` with values of a type as a span of it.
+/// Calls `function` with the values as a span of their own type.
 template <typename Function>
 decltype(auto) visit_values(ValueType type,
                             std::span<const std::byte> values,
@@ -81,7 +81,7 @@ decltype(auto) visit_values(const RawImage& image, Function&& function) {
   return visit_values(image.type, image.values, std::forward<Function>(function));
 }
 
-/// Throws when the reader does not want the image; sees it without values.
+/// Throws when the reader does not want the image, which has no values yet.
 using AcceptImage = std::function<void(const RawImage&)>;
 
 }  // namespace af

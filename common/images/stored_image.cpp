@@ -35,8 +35,8 @@ constexpr std::uint64_t kPieceBytes = std::uint64_t{1} << 20;
                   std::to_string(found));
 }
 
-/// A stream of another length than stated is another stream, or was cut and mended. What stands
-/// behind it is said, not read.
+/// A stream of another length than stated is another stream, or was cut and mended. What follows it
+/// gets a warning, and is not read.
 void check_compressed_bytes(const fs::path& path,
                             const ImageHeader& header,
                             std::uint64_t found,
@@ -60,7 +60,7 @@ void reverse_each(std::vector<std::byte>& bytes, std::size_t value_bytes) {
   }
 }
 
-/// Values by slope and intercept, in double precision and then rounded to To, as ITK does.
+/// Applies slope and intercept in double precision and rounds to To, as ITK does.
 template <typename To>
 std::vector<std::byte> rescaled_to(const ImageHeader& header, std::span<const std::byte> bytes) {
   std::vector<To> values;
@@ -94,7 +94,7 @@ WritableFormat writable_format(const fs::path& path) {
                    ": unknown image extension; known: .mha .nii.gz .nii .nrrd .tif .tiff .png");
 }
 
-/// ITK does not notice a full disk: it leaves a shorter file and says nothing.
+/// ITK does not notice a full disk: it leaves a shorter file without a word.
 void check_is_whole(const RawImage& image, const fs::path& file, ImageFormat format) {
   bool is_whole = false;
   try {

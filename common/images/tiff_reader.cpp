@@ -20,7 +20,7 @@ namespace {
 constexpr tmsize_t kMostBlockBytes = tmsize_t{1} << 30;
 constexpr std::size_t kMostPages = 100000;
 
-/// An open file whose library's complaints are kept, not printed.
+/// An open file. Its library's complaints are kept, not printed.
 class TiffFile {
  public:
   explicit TiffFile(const fs::path& path) : path_(path.string()) {
@@ -158,13 +158,13 @@ Page page_of(const TiffFile& file) {
 struct Block {
   std::size_t column = 0;
   std::size_t row = 0;
-  std::size_t columns = 0;  ///< that belong to the page
+  std::size_t columns = 0;  ///< how many belong to the page
   std::size_t rows = 0;
   std::size_t row_bytes = 0;
   std::vector<unsigned char> bytes;
 };
 
-/// The value at a column of a row of packed ones, highest bit first.
+/// The value at a column of a row of packed values, highest bit first.
 std::uint16_t packed_value(const unsigned char* row, std::size_t column, int bits) {
   std::uint32_t value = 0;
   for (std::size_t bit = column * static_cast<std::size_t>(bits),
@@ -201,7 +201,7 @@ std::size_t checked_block_bytes(const TiffFile& file, tmsize_t bytes) {
   return static_cast<std::size_t>(bytes);
 }
 
-/// Strips are as wide as the page, and the last one is shorter; tiles are whole.
+/// Strips are as wide as the page, and the last one is shorter. Tiles are whole.
 void read_blocks(const TiffFile& file, const Page& page, std::byte* values) {
   TIFF* const tiff = file.get();
   const bool is_tiled = TIFFIsTiled(tiff) != 0;

@@ -19,10 +19,11 @@ namespace af {
 
 namespace {
 
-/// MPI counts are int: longer messages go in pieces.
+/// MPI counts are int, so longer messages go in pieces.
 constexpr std::size_t kLargestPiece = std::size_t{1} << 30;
 
-/// Communicator::alone(): there is nobody to talk to, and MPI may not be initialised.
+/// Whether this is Communicator::alone(): there is nobody to talk to, and MPI may not be
+/// initialised.
 bool is_alone(MPI_Comm communicator) {
   return communicator == MPI_COMM_NULL;
 }
@@ -90,7 +91,8 @@ RankFailure plain_failure_of(const std::exception_ptr& error) {
   } catch (const std::bad_alloc&) {
     return {static_cast<int>(ExitCode::Internal), "out of memory"};
   } catch (const std::filesystem::filesystem_error& error_of_file) {
-    // A name too long, links in a circle, a folder that may not be listed: the path is at fault.
+    // The path is at fault: the name is too long, links form a circle, or a folder may not be
+    // listed.
     return {static_cast<int>(ExitCode::File),
             error_of_file.path1().string() + ": " + error_of_file.code().message()};
   } catch (const std::exception& unknown) {
@@ -100,7 +102,7 @@ RankFailure plain_failure_of(const std::exception_ptr& error) {
   }
 }
 
-/// Zeros, page by page as it is touched.
+/// Zeros. Pages are allocated as they are touched.
 std::shared_ptr<std::byte> memory_of_process(std::size_t bytes) {
   const std::size_t mapped = std::max<std::size_t>(bytes, 1);
   void* const start =
@@ -191,7 +193,7 @@ std::vector<std::vector<std::byte>> Communicator::all_gather(
   const auto ranks = static_cast<std::size_t>(size());
   const std::uint64_t my_bytes = mine.size();
   std::vector<std::uint64_t> bytes(ranks);
-  // The check compares names of types, and data() has lost that of uint64_t.
+  // The check compares names of types, and data() has lost the name of uint64_t.
   require_success(  // NOLINTNEXTLINE(mpi-type-mismatch)
       MPI_Allgather(&my_bytes, 1, MPI_UINT64_T, bytes.data(), 1, MPI_UINT64_T, impl_->handle),
       "MPI_Allgather");
@@ -256,8 +258,8 @@ std::shared_ptr<const std::byte> Communicator::allocate_on_node_together(
     return memory;
   }
   const Communicator on_node = node();
-  // On all nodes: ranks of another node would otherwise go on to a collective call that these ranks
-  // never reach.
+  // All nodes take part. Ranks of another node would otherwise go on to a collective call that
+  // these ranks never reach.
   all_or_none(*this, [&] {
     fill(std::span<std::byte>(memory.get(), bytes), on_node.rank(), on_node.size());
   });
@@ -322,7 +324,7 @@ RankFailure first_failure(const Communicator& communicator, const RankFailure& m
 
 RankFailure failure_of(const std::exception_ptr& error) {
   RankFailure failure = plain_failure_of(error);
-  // The unit that a rank was at tells more than its number; a stop is not a failure.
+  // The unit that a rank was at tells more than its number. A stop is not a failure.
   const std::string unit = take_failed_unit();
   if (!unit.empty() && failure.exit_code != static_cast<int>(ExitCode::Stopped))
     failure.message = unit + ": " + failure.message;

@@ -16,12 +16,12 @@
 
 namespace af {
 
-/// A group of MPI ranks. Without mpirun it is a group of one. MPI stays behind this header.
+/// A group of MPI ranks; without mpirun, a group of one. MPI stays behind this header.
 class Communicator {
  public:
   /// All ranks of the job. Requires a live MpiEnvironment.
   static Communicator world();
-  /// The calling process alone, without MPI: of libraries, and of programs that no launcher
+  /// The calling process alone, without MPI. It serves libraries, and programs that no launcher
   /// started. It cannot write fields, which takes MPI-IO. \test CommunicatorAlone.NeedsNoMpi
   static Communicator alone();
 
@@ -35,7 +35,8 @@ class Communicator {
   void sum(std::span<std::uint64_t> values) const;
   /// Collective. Element-wise maxima, in place.
   void maximum(std::span<std::uint64_t> values) const;
-  /// Collective. Copies `bytes` of rank 0 to every rank (any size; sent in pieces below 2 GiB).
+  /// Collective. Copies `bytes` of rank 0 to every rank. Any size: it is sent in pieces below 2
+  /// GiB.
   void broadcast(std::vector<std::byte>& bytes) const;
   void broadcast(std::string& text) const;
   /// Collective. Every rank's bytes, in rank order, on every rank.
@@ -48,11 +49,11 @@ class Communicator {
   [[nodiscard]] Communicator node() const;
 
   /// Collective. Memory of `bytes` zeros held once per node, aligned to kNodeMemoryAlignment.
-  /// To let go of it is not collective: each process unmaps its own view (NodeMemoryFile), and the
-  /// system frees the memory with the last. So ranks may do it in any order, also while an
+  /// Letting go of it is not collective: each process unmaps its own view (NodeMemoryFile), and the
+  /// system frees the memory with the last. Ranks may therefore do it in any order, even while an
   /// exception unwinds, and none waits.
   [[nodiscard]] std::shared_ptr<std::byte> allocate_on_node(std::size_t bytes) const;
-  /// Collective. The same, filled: `fill` runs on each node's first rank only, and all wait for it.
+  /// Collective. The same, filled: `fill` runs only on each node's first rank, and all wait for it.
   /// An exception in `fill` is thrown on every rank of every node.
   [[nodiscard]] std::shared_ptr<const std::byte> allocate_on_node(
       std::size_t bytes, const std::function<void(std::span<std::byte>)>& fill) const;
@@ -62,12 +63,12 @@ class Communicator {
       std::size_t bytes,
       const std::function<void(std::span<std::byte>, int part, int parts)>& fill) const;
 
-  /// Collective. The same, filled on rank 0 alone: the other nodes get a copy, so that no file need
+  /// Collective. The same, filled on rank 0 alone. The other nodes get a copy, so that no file need
   /// be read twice. An exception in `fill` is thrown on every rank.
   [[nodiscard]] std::shared_ptr<const std::byte> allocate_on_nodes_from_root(
       std::size_t bytes, const std::function<void(std::span<std::byte>)>& fill) const;
-  /// Collective. The same, filled by the ranks of rank 0's node together, as
-  /// allocate_on_node_together() has them.
+  /// Collective. The same, filled by the ranks of rank 0's node together, as in
+  /// allocate_on_node_together().
   [[nodiscard]] std::shared_ptr<const std::byte> allocate_on_nodes_from_root_together(
       std::size_t bytes,
       const std::function<void(std::span<std::byte>, int part, int parts)>& fill) const;
@@ -86,8 +87,8 @@ struct RankFailure {
   std::string message;
 };
 
-/// Collective. The failure of the lowest failed rank (its message names that rank), the same on
-/// every rank.
+/// Collective. The failure of the lowest failed rank, the same on every rank. Its message names
+/// that rank.
 RankFailure first_failure(const Communicator& communicator, const RankFailure& mine);
 
 /// The failure that an exception means, as app_main reports it.
@@ -96,10 +97,10 @@ RankFailure failure_of(const std::exception_ptr& error);
 /// Throws the failure as a RemoteError with its exit code.
 [[noreturn]] void throw_failure(const RankFailure& failure);
 
-/// Collective. Runs `function` on every rank; when it throws on any rank, every rank throws the
-/// same error. Before the next collective call, wrap everything that each rank does by itself and
-/// that may fail on some ranks only; otherwise the other ranks wait for ever. What rank 0 does for
-/// all is on_root() or do_on_root().
+/// Collective. Runs `function` on every rank. When it throws on any rank, every rank throws the
+/// same error. Wrap everything that each rank does by itself before the next collective call and
+/// that may fail on only some ranks; otherwise the other ranks wait for ever. For what rank 0 does
+/// for all, use on_root() or do_on_root().
 template <typename Function>
 std::invoke_result_t<Function> all_or_none(const Communicator& communicator, Function&& function) {
   using Result = std::invoke_result_t<Function>;

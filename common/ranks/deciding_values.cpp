@@ -26,7 +26,7 @@ std::string text(const Eigen::Vector3d& numbers) {
          number_text(numbers.z()) + "]";
 }
 
-/// What is said of a value where `other` was expected; empty when they are the same.
+/// The message about a value where `other` was expected; empty when they are the same.
 std::string difference(const std::string& other, const std::string& value) {
   return value == other ? "" : text(value);
 }

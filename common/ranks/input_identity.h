@@ -10,14 +10,14 @@
 
 namespace af {
 
-/// What tells an input of a run from another: its SHA-256, or what a CT is.
+/// What distinguishes an input of a run: its SHA-256, or a CT's identity.
 using InputIdentity = std::variant<std::string, CtIdentity>;
 using InputIdentities = std::map<std::string, InputIdentity>;  ///< by name or path
 
 nlohmann::json to_json(const CtGrid& grid);
 nlohmann::json to_json(const CtIdentity& ct);
 
-/// Of what to_json() made. Throws nlohmann's exceptions.
+/// The reverse of to_json(). Throws nlohmann's exceptions.
 CtIdentity ct_identity_of(const nlohmann::json& json);
 
 }  // namespace af

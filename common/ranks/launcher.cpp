@@ -15,7 +15,7 @@ std::string variable(const char* name) {
   return value == nullptr ? "" : value;
 }
 
-/// Of the step of Slurm that holds this process and that has no PMI; "" when there is none.
+/// Number of tasks of the Slurm step that holds this process and has no PMI; "" when there is none.
 std::string tasks_without_pmi() {
   return is_launched() ? "" : variable("SLURM_STEP_NUM_TASKS");
 }
@@ -36,7 +36,7 @@ bool is_launched() {
 }
 
 bool is_first_process() {
-  // Of a shell that srun started, mpirun's variables count.
+  // mpirun's variables take precedence in a shell that srun started.
   for (const char* name : {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"})
     if (const std::string rank = variable(name); !rank.empty()) return rank == "0";
   return true;

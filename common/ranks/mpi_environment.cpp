@@ -20,7 +20,7 @@ namespace {
 
 std::atomic<bool> abort_required = false;
 
-/// An environment variable that has another value while this lives, or none.
+/// Gives an environment variable another value, or none, while this lives.
 class VariableMeanwhile {
  public:
   VariableMeanwhile(const char* name, const std::optional<std::string>& value) : name_(name) {
@@ -48,7 +48,7 @@ bool is_usable_folder(const std::string& folder) {
   return std::filesystem::is_directory(folder, ignored) && access(folder.c_str(), W_OK | X_OK) == 0;
 }
 
-/// The first of the user's folder and the usual ones that can hold files; the user's when none can.
+/// The first of the user's folder and the usual ones that can hold files. The user's when none can.
 std::optional<std::string> usable_temporary_folder() {
   std::optional<std::string> stated;
   if (const char* const folder = std::getenv("TMPDIR")) stated = folder;
@@ -64,9 +64,9 @@ MpiEnvironment::MpiEnvironment(int& argc, char**& argv) {
   // Without mpirun, Open MPI would start a daemon beside the program that could launch more
   // processes. We launch none, and programs start a third faster without it.
   setenv("OMPI_MCA_ess_singleton_isolated", "1", 0);
-  // For shared file pointers, which we never use, Open MPI would make a file per rank beside each
-  // file that ranks open together, or one in the folder that there is not. A setting by the user
-  // stays.
+  // For shared file pointers, which we never use, Open MPI would create a file per rank beside each
+  // file that ranks open together, or try to in a folder that does not exist. A setting by the user
+  // is kept.
   setenv("OMPI_MCA_sharedfp", is_launched() ? "^lockedfile" : "^lockedfile,sm", 0);
   if (is_launched())
     init(argc, argv);
@@ -77,22 +77,22 @@ MpiEnvironment::MpiEnvironment(int& argc, char**& argv) {
 void MpiEnvironment::init(int& argc, char**& argv) {
   const bool names_process_manager = std::getenv("OMPI_MCA_pmix") != nullptr;
   MPI_Init_thread(&argc, &argv, MPI_THREAD_FUNNELED, &thread_level_);
-  // Open MPI notes that there is no process manager, which would crash an mpirun that we or our
+  // Open MPI notes that there is no process manager. That would crash an mpirun that we or our
   // caller start.
   if (!names_process_manager) unsetenv("OMPI_MCA_pmix");
 }
 
 void MpiEnvironment::init_alone(int& argc, char**& argv) {
-  // Alone it needs no folder for the job. All programs without mpirun would share one on a
-  // machine, and one that ends removes it while another begins: of starts four at a time, 1 of 600
-  // failed. What this program starts may need its folder.
+  // Alone, Open MPI needs no folder for the job. All programs without mpirun would share one on a
+  // machine, and one that ends removes it while another begins: with four starts at a time, 1 of
+  // 600 failed. What this program starts may need its folder.
   constexpr const char* kMakesFolder = "OMPI_MCA_orte_create_session_dirs";
   const char* const makes_folder = std::getenv(kMakesFolder);
   const VariableMeanwhile no_folder(kMakesFolder, makes_folder == nullptr ? "0" : makes_folder);
   // Open MPI 5 makes one even so, and crashes where it cannot.
   const VariableMeanwhile temporary_folder("TMPDIR", usable_temporary_folder());
-  // The shell of a step of one task, by srun, needs no process manager, but Open MPI looks for
-  // Slurm's and ends the program where there is none.
+  // The shell of a one-task step by srun needs no process manager. Open MPI looks for Slurm's, and
+  // ends the program where there is none.
   constexpr const char* kStep = "SLURM_STEP_ID";
   const char* const step = std::getenv(kStep);
   const VariableMeanwhile hidden_step(

@@ -3,7 +3,7 @@
 
 namespace af {
 
-/// Lifetime of MPI in a program: initialised by the constructor, finalised by the destructor. One
+/// Lifetime of MPI in a program: the constructor initialises it, the destructor finalises it. One
 /// per process. Works with and without mpirun, and in a shell that srun started as its only task.
 class MpiEnvironment {
  public:
@@ -15,7 +15,7 @@ class MpiEnvironment {
   /// What MPI says it supports: MPI_THREAD_SINGLE or more.
   [[nodiscard]] int thread_level() const { return thread_level_; }
 
-  /// Ends every rank of the job with `exit_code`, at once: this process where MPI is not
+  /// Ends every rank of the job at once with `exit_code`. Ends this process where MPI is not
   /// initialised.
   [[noreturn]] static void abort(int exit_code);
 
@@ -31,8 +31,8 @@ class MpiEnvironment {
   int thread_level_ = 0;
 };
 
-/// RemoteError, as every rank is told the same, when MPI's level is below MPI_THREAD_FUNNELED: our
-/// processes have threads, of which the first alone calls MPI.
+/// Throws RemoteError when MPI's level is below MPI_THREAD_FUNNELED, since every rank is told the
+/// same. Our processes have threads, of which only the first calls MPI.
 /// \test MpiEnvironment.WithoutSupportOfThreadsIsAnError
 void require_threads(int thread_level);
 

@@ -43,14 +43,15 @@ NodeMemoryFile::~NodeMemoryFile() {
 
 std::string NodeMemoryFile::create(std::size_t bytes) {
   std::string name;
-  // A killed process of this number may have left a file.
+  // A killed process with this number may have left a file.
   for (int turn = 0; descriptor_ < 0; ++turn) {
     name = "/af-" + std::to_string(::getpid()) + "-" + std::to_string(turn);
     descriptor_ = ::shm_open(name.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, kMode);
     if (descriptor_ < 0 && errno != EEXIST) throw failure(name, "cannot be made");
   }
   created_ = name;
-  // Room for all of it at once: a page that is touched where there is none ends the process.
+  // Reserves all of the memory at once: touching a page for which there is no room ends the
+  // process.
   do errno = ::posix_fallocate(descriptor_, 0, static_cast<off_t>(std::max<std::size_t>(bytes, 1)));
   while (errno == EINTR);
   if (errno == ENOSPC || errno == EFBIG || errno == ENOMEM) throw no_room(descriptor_, bytes);

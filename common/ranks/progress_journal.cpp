@@ -22,15 +22,15 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kFormat = "af-progress-journal";
-constexpr int kFormatVersion = 4;  // 4: records have keys; fields keep their units so, too
+constexpr int kFormatVersion = 4;  // 4: records have keys, and fields keep their units this way too
 
-/// Stands before the content of every record.
+/// Precedes the content of every record.
 struct RecordHeader {
   std::array<char, 8> magic = {'A', 'F', 'R', 'E', 'C', 'O', 'R', '4'};
   std::int64_t key = 0;
   std::uint64_t content_bytes = 0;
   std::uint32_t content_crc = 0;
-  std::uint32_t header_crc = 0;  ///< of the journal's name and the fields before it
+  std::uint32_t header_crc = 0;  ///< over the journal's name and the fields before it
 
   [[nodiscard]] std::uint32_t computed_crc(const std::string& journal) const {
     return crc32c(std::as_bytes(std::span(this, 1)).first(offsetof(RecordHeader, header_crc)),
@@ -39,7 +39,7 @@ struct RecordHeader {
 };
 static_assert(sizeof(RecordHeader) == 32);
 
-/// Records of one shard, from front to back or at known places.
+/// Reads records of one shard, in order or at known places.
 class ShardReader {
  public:
   ShardReader(const JournalFiles& files, const JournalShard& shard)
@@ -55,7 +55,7 @@ class ShardReader {
   [[nodiscard]] bool is_unreadable() const { return size_ > 0 && !file_.is_open(); }
   [[nodiscard]] const fs::path& path() const { return path_; }
 
-  /// Whether there is a sound header; its content is read next.
+  /// Reads a header and returns whether it is sound. Its content is read next.
   bool read_header(std::uint64_t offset) {
     if (!file_.is_open() || offset > size_ || size_ - offset < sizeof(header_)) return false;
     file_.clear();
@@ -91,7 +91,7 @@ class ShardReader {
   RecordHeader header_;
 };
 
-/// Calls `take` at every record of a shard, by its header.
+/// Calls `take` for every record of a shard, with its header.
 void for_each_record(const JournalFiles& files,
                      const JournalShard& shard,
                      const std::function<void(ShardReader&, const RecordPlace&)>& take) {
@@ -116,7 +116,7 @@ bool is_there(const fs::path& path) {
   return fs::symlink_status(path).type() != fs::file_type::not_found;
 }
 
-/// The manifest; FileError that says what to do when it cannot be one.
+/// The manifest. Throws FileError that says what to do when the file cannot be one.
 UnfinishedWork read_manifest(const fs::path& path, std::int64_t least_unit_size) {
   const auto unusable = [&](const std::string& why) {
     return FileError(path.string(), why + ": start over with --restart");
@@ -142,7 +142,7 @@ UnfinishedWork read_manifest(const fs::path& path, std::int64_t least_unit_size)
   }
 }
 
-/// Stands beside the manifest when the options of the work were refused.
+/// A file beside the manifest that says that the options of the work were refused.
 fs::path refused_path(const JournalFiles& files) {
   return files.folder / (files.name + ".refused");
 }
@@ -158,12 +158,12 @@ fs::path JournalFiles::shard(const JournalShard& shard) const {
 }
 
 std::vector<JournalShard> JournalFiles::shards() const {
-  // The next run's number must be higher than all.
+  // The next run's number must be higher than all of these.
   constexpr std::int64_t kMost = 1'000'000'000;
   std::vector<JournalShard> found;
   for (const auto& entry : fs::directory_iterator(folder)) {
     const std::string file = entry.path().filename().string();
-    if (!file.starts_with(name + ".")) continue;  // another journal's name may begin alike
+    if (!file.starts_with(name + ".")) continue;  // another journal's name may begin the same way
     char* end = nullptr;
     const std::int64_t run = std::strtoll(file.c_str() + name.size() + 1, &end, 10);
     const std::int64_t rank = *end == '-' ? std::strtoll(end + 1, nullptr, 10) : -1;
@@ -195,7 +195,7 @@ bool holds_progress_journal(const fs::path& folder) {
       (void)read_manifest(entry.path(), 0);
       return true;
     } catch (const FileError&) {
-      // Another kind of file.
+      // This is another kind of file.
     }
   }
   return false;
@@ -220,7 +220,7 @@ void ProgressJournal::go_on_or_begin(const UnfinishedWork& work) {
     for (const JournalShard& shard : files_.shards()) run_ = shard.run + 1;
     return;
   }
-  // Without a manifest we cannot tell what records belong to.
+  // Without a manifest nothing tells what the records belong to.
   for (const JournalShard& shard : files_.shards()) fs::remove_all(files_.shard(shard));
   fs::remove_all(files_.manifest());
   const nlohmann::json written = {{"format", kFormat},
@@ -230,7 +230,7 @@ void ProgressJournal::go_on_or_begin(const UnfinishedWork& work) {
   write_text_file(files_.manifest(), written.dump(2) + "\n");
 }
 
-/// Whether this run goes on with the work that is there.
+/// Whether this run continues the work that is there.
 bool ProgressJournal::takes_over(const UnfinishedWork& work) {
   UnfinishedWork earlier;
   try {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The one store of unfinished work: small rows of an evaluation as well as the large blocks of a
-// field.
+// The one store of unfinished work, for small rows of an evaluation as well as for large blocks of
+// a field.
 #pragma once
 
 #include <chrono>
@@ -23,11 +23,12 @@ namespace af {
 /// Work as a new run begins it, or as a later run continues it.
 struct UnfinishedWork {
   std::filesystem::path folder;  ///< "OUTPUT.progress": RunFolder::unfinished()
-  std::string name;              ///< of its files; several may share a folder
+  std::string name;              ///< of its files; several journals may share a folder
   DecidingValues decides;        ///< what every result depends on
-  std::int64_t unit_size = 0;    ///< of what it is cut into; later runs keep the first one's
-  bool gives_way = false;        ///< discarded, not refused, when it cannot be continued
-  bool restarts = false;         ///< discard any earlier progress
+  std::int64_t unit_size =
+      0;                   ///< size of the parts it is cut into; later runs keep the first one's
+  bool gives_way = false;  ///< when it cannot be continued, it is discarded instead of refused
+  bool restarts = false;   ///< discard any earlier progress
 };
 
 /// What one process has written in one run.
@@ -39,7 +40,7 @@ struct JournalShard {
   auto operator<=>(const JournalShard&) const = default;
 };
 
-/// Where a record lies whose header is sound. Its content may be damaged.
+/// Where a record lies that has a sound header. Its content may be damaged.
 struct RecordPlace {
   JournalShard shard;
   std::uint64_t offset = 0;
@@ -49,12 +50,13 @@ struct RecordPlace {
   auto operator<=>(const RecordPlace&) const = default;
 };
 
-/// The files of a journal: FOLDER/NAME.json says what it is valid for; to FOLDER/NAME.RUN-RANK
-/// .records each process appends its finished records, so that nothing passes through one process.
-/// A record has a key, its size, and CRC-32Cs of its header and its content. A reader comes to a
-/// record through the headers before it, so a torn or damaged header ends its file, while damaged
-/// content is the loss of one record. Nobody appends to the files of an earlier run: a process of
-/// such a run that still writes, on a host that was lost and came back, damages nothing.
+/// The files of a journal. FOLDER/NAME.json says what it is valid for. Each process appends its
+/// finished records to its own FOLDER/NAME.RUN-RANK.records, so that nothing passes through one
+/// process.
+/// A record has a key, its size, and CRC-32Cs of its header and its content. A reader reaches a
+/// record through the headers before it. A torn or damaged header therefore ends its file, while
+/// damaged content costs only that record. Nobody appends to the files of an earlier run: if a
+/// process of such a run still writes, on a host that was lost and came back, it damages nothing.
 struct JournalFiles {
   std::filesystem::path folder;
   std::string name;
@@ -62,11 +64,11 @@ struct JournalFiles {
   [[nodiscard]] std::filesystem::path manifest() const;
   [[nodiscard]] std::filesystem::path shard(const JournalShard& shard) const;
 
-  /// In order. Files of names that no run can have are passed over.
+  /// In order. Files with names that no run can have are ignored.
   [[nodiscard]] std::vector<JournalShard> shards() const;
-  /// The records of a shard, by their headers; none when it is not there or no regular file.
+  /// The records of a shard, by their headers. None when it does not exist or is no regular file.
   [[nodiscard]] std::vector<RecordPlace> records(const JournalShard& shard) const;
-  /// Reads a record's content into parts, which together have its size; false when it is damaged.
+  /// Reads a record's content into parts, which together have its size. False when it is damaged.
   [[nodiscard]] bool read(const RecordPlace& place,
                           std::initializer_list<std::span<std::byte>> parts) const;
 };
@@ -74,13 +76,13 @@ struct JournalFiles {
 /// Whether a journal's manifest lies in a folder.
 bool holds_progress_journal(const std::filesystem::path& folder);
 
-/// A journal as it is opened or created, by one process.
+/// A journal as one process opens or creates it.
 class ProgressJournal {
  public:
   using Visit = std::function<void(std::int64_t key, std::span<const std::byte> content)>;
 
-  /// InputError that names the difference when earlier records were about something else and do not
-  /// give way. FileError when files cannot be read or written.
+  /// Throws InputError that names the difference when earlier records were about something else and
+  /// do not give way, FileError when files cannot be read or written.
   explicit ProgressJournal(const UnfinishedWork& work);
 
   [[nodiscard]] const JournalFiles& files() const { return files_; }
@@ -88,12 +90,12 @@ class ProgressJournal {
   [[nodiscard]] std::int64_t run() const { return run_; }
   /// The unit size of the work, as set by the run that began it.
   [[nodiscard]] std::int64_t unit_size() const { return unit_size_; }
-  /// Whether work of other options was thrown away.
+  /// Whether work with other options was discarded.
   [[nodiscard]] bool has_replaced() const { return has_replaced_; }
 
-  /// The sound records, by run, rank and in the order in which they were appended. Ranks 0 ...
-  /// rank_count - 1 of this run are looked for by name: a network file system may list late what
-  /// another host has just made.
+  /// Visits the sound records by run, by rank and in the order in which they were appended. Ranks 0
+  /// ... rank_count - 1 of this run are looked for by name, because a network file system may be
+  /// late to list what another host has just made.
   void visit(int rank_count, const Visit& visit) const;
 
   /// Notes that the options of this work were refused, so that a later run with others may discard
@@ -115,9 +117,9 @@ class ProgressShard {
  public:
   ProgressShard(JournalFiles files, const JournalShard& shard);
 
-  /// Appends a record of these parts. It survives the end of this process from now on; the end of
-  /// the machine after sync(), or a minute later with the next record. FileError when it cannot be
-  /// written.
+  /// Appends a record of these parts. From now on it survives the end of this process. It survives
+  /// a crash of the machine after sync(), or from the next record a minute later. Throws FileError
+  /// when it cannot be written.
   RecordPlace append(std::int64_t key, std::initializer_list<std::span<const std::byte>> parts);
 
   void sync();

@@ -9,9 +9,9 @@
 
 namespace af {
 
-/// Prints progress with elapsed time and ETA on standard error: one line rewritten in place on a
-/// terminal, otherwise plain lines at most every ten seconds. Silent when `enabled` is false (ranks
-/// other than 0).
+/// Prints progress with elapsed time and ETA on standard error. On a terminal it rewrites one line
+/// in place; otherwise it prints plain lines at most every ten seconds. Silent when `enabled` is
+/// false (ranks other than 0).
 class ProgressPrinter {
  public:
   ProgressPrinter(std::string label, bool enabled);

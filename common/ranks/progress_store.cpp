@@ -45,7 +45,7 @@ void ProgressStore::give_way() const {
   try {
     journal_.value().give_way();
   } catch (const Error&) {
-    // What the options were refused for is the error to tell.
+    // The user should see the error for which the options were refused, not this one.
   }
 }
 

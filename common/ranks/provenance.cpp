@@ -17,7 +17,7 @@ namespace af {
 
 namespace {
 
-/// When this process started, as near as a library can tell.
+/// When this process started, as closely as a library can tell.
 const std::time_t process_start_time = std::time(nullptr);
 
 std::string utc_text(std::time_t time) {
@@ -38,7 +38,7 @@ std::string cpu_model() {
   return "unknown";
 }
 
-/// One line that cannot end a shell comment.
+/// The text as one line that cannot end a shell comment.
 std::string comment_text(std::string text) {
   for (char& character : text)
     if (static_cast<unsigned char>(character) < ' ') character = ' ';

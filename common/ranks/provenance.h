@@ -11,7 +11,7 @@
 
 namespace af {
 
-/// What every output records about its making.
+/// What every output records about how it was made.
 struct Provenance {
   std::string program;       ///< "af-register"
   std::string command_line;  ///< quoted for a shell
@@ -26,12 +26,12 @@ struct Provenance {
 /// CPU, start time (UTC).
 nlohmann::json to_json(const Provenance& provenance);
 
-/// Writes `folder`/reproduce.sh: a commented, executable script that changes to the working folder
-/// it was run in and runs the same command.
+/// Writes `folder`/reproduce.sh: a commented, executable script that changes to the folder from
+/// which it was run and runs the same command.
 void write_reproduce_script(const std::filesystem::path& folder, const Provenance& provenance);
 
-/// Writes reproduce.sh beside `file`, then `file`: the summary with its provenance. Written last,
-/// it says that everything is there.
+/// Writes reproduce.sh beside `file`, then `file`: the summary with its provenance. Because it is
+/// written last, it says that everything is there.
 void write_results_last(const std::filesystem::path& file,
                         nlohmann::json summary,
                         const Provenance& provenance);

@@ -15,43 +15,44 @@
 
 namespace af {
 
-/// Every rank appends what it finishes to a shard of its own in one journal: no result passes
-/// through rank 0 until all are there. The result of an item must not depend on the rank that makes
-/// it, nor on anything that `decides` does not name.
+/// Shares items over the ranks. Every rank appends what it finishes to a shard of its own in one
+/// journal, and no result passes through rank 0 until all are there. The result of an item must
+/// depend neither on the rank that makes it, nor on anything that `decides` does not name.
 /// \test ResumableItems.DoesOnlyWhatNoEarlierRunFinished
 class ResumableItems {
  public:
   using Work = std::function<std::vector<std::byte>(std::int64_t item)>;
   using Receive = ProgressJournal::Visit;
 
-  /// Collective. Opens or creates the journal. InputError that names the difference when an earlier
-  /// run began it with other options or inputs.
+  /// Collective. Opens or creates the journal. Throws InputError that names the difference when an
+  /// earlier run began it with other options or inputs.
   ResumableItems(const UnfinishedWork& work, const Communicator& communicator);
 
-  /// Collective. Does those of `items` (ascending, each at least 0, the same on every rank) that no
-  /// run has finished, shared over the ranks as these become free; `work` must not call MPI. Rank 0
+  /// Collective. Does those of `items` that no run has finished (ascending, each at least 0, the
+  /// same on every rank). Ranks get items as they become free; `work` must not call MPI. Rank 0
   /// reports the progress of `what` ("case skull, field registrations"; empty: no report). When any
-  /// rank was asked to stop, the remaining items are passed over and every rank throws
-  /// StoppedError, with everything finished saved.
+  /// rank was asked to stop, the remaining items are skipped and every rank throws StoppedError,
+  /// with everything finished saved.
   void complete(const std::vector<std::int64_t>& items, const std::string& what, const Work& work);
 
   /// Rank 0, after complete(): calls `receive` with the result of each of its items, in any order.
   /// When several runs made the same item, it is called with each of the results, which are equal.
-  /// FileError when some are missing.
+  /// Throws FileError when some are missing.
   void visit(const Receive& receive) const;
 
  private:
   /// Collective. Those of `items` that no earlier run finished.
   [[nodiscard]] std::vector<std::int64_t> unfinished(const std::vector<std::int64_t>& items) const;
-  /// Collective. Makes the appended items survive a crash of the machine; StoppedError when a stop
-  /// was asked for.
+  /// Collective. Makes the appended items survive a crash of the machine. Throws StoppedError when
+  /// a stop was asked for.
   void save(const std::string& what);
 
   Communicator communicator_;
   ProgressStore store_;                 ///< keys are items
-  std::vector<std::int64_t> finished_;  ///< rank 0: by earlier runs, ascending
-  std::vector<std::int64_t> items_;     ///< rank 0: of complete()
-  std::uint64_t saved_ = 0;             ///< of items_, by this rank; on rank 0 by earlier runs too
+  std::vector<std::int64_t> finished_;  ///< rank 0: items that earlier runs finished, ascending
+  std::vector<std::int64_t> items_;     ///< rank 0: those of complete()
+  std::uint64_t saved_ =
+      0;  ///< how many of items_ this rank saved; on rank 0 earlier runs count too
 };
 
 }  // namespace af

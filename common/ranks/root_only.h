@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a value exists, said by its type. Most values are each rank's own; two kinds are not:
+// Types that say where a value exists. Most values are each rank's own. Two kinds are not:
 //
 //     RootOnly<Study> read = on_root(world, [&] { return read_study(path); });  // on rank 0
 //     Shared<Study> study = std::move(read).share();                            // on every rank
 //
 // A rank that throws alone leaves the others waiting in their next collective call. What rank 0
-// does for all may fail there alone, so the failure stays in the RootOnly, and only collective
-// calls, which throw it on every rank, lead on from there. What each rank does by itself goes
-// through all_or_none().
+// does for all may fail there alone. The failure therefore stays in the RootOnly, and only
+// collective calls, which throw it on every rank, lead on from there. What each rank does by itself
+// goes through all_or_none().
 #pragma once
 
 #include <cstddef>
@@ -25,20 +25,20 @@ namespace af {
 template <typename T>
 class RootOnly;
 
-/// What `make` returns, on rank 0, which alone calls it. Not collective.
+/// What `make` returns on rank 0, which alone calls it. Not collective.
 template <typename Make>
 RootOnly<std::remove_cvref_t<std::invoke_result_t<Make>>> on_root(const Communicator& communicator,
                                                                   Make&& make);
 
-/// A value that every rank holds, the same one. Only RootOnly::share() makes it. It passes for a
-/// `const T&`: what is the same everywhere can be used like a rank's own.
+/// A value that every rank holds, the same on all. Only RootOnly::share() makes it. It converts to
+/// a `const T&`: what is the same everywhere can be used like a rank's own.
 template <typename T>
 class Shared {
  public:
   const T& operator*() const { return value_; }
   const T* operator->() const { return &value_; }
   operator const T&() const { return value_; }
-  /// From here on each rank has its own, which it may change.
+  /// From here on each rank has its own value, which it may change.
   [[nodiscard]] T take() && { return std::move(value_); }
 
  private:
@@ -48,7 +48,8 @@ class Shared {
   T value_;
 };
 
-/// A value that rank 0 alone holds, or why it could not be made. The other ranks hold neither.
+/// A value that only rank 0 holds, or the reason why it could not be made. The other ranks hold
+/// neither.
 template <typename T>
 class [[nodiscard]] RootOnly {
   static_assert(!std::is_void_v<T>, "do_on_root() is for work that makes no value");
@@ -65,7 +66,7 @@ class [[nodiscard]] RootOnly {
     }
   }
 
-  /// What `use` makes of the value, on rank 0 again; a failure is handed on.
+  /// Applies `use` to the value, on rank 0 again. A failure is handed on.
   template <typename Use>
   auto then(Use&& use) const {
     return on_root(communicator_, [&] {
@@ -74,15 +75,15 @@ class [[nodiscard]] RootOnly {
     });
   }
 
-  /// Collective. Itself, once every rank knows that there is a value; otherwise every rank throws
-  /// the failure, as a RemoteError with its exit code.
+  /// Collective. Returns itself once every rank knows that there is a value. Otherwise every rank
+  /// throws the failure, as a RemoteError with its exit code.
   RootOnly confirmed() && {
     throw_if_failed();
     return std::move(*this);
   }
 
-  /// Collective. The value on every rank, sent by bytes_of(), so that it keeps every bit; otherwise
-  /// as confirmed(). \test RootOnly.AValueThatIsSharedIsEqualOnEveryRank
+  /// Collective. The value on every rank, sent by bytes_of(), so that it keeps every bit. Otherwise
+  /// like confirmed(). \test RootOnly.AValueThatIsSharedIsEqualOnEveryRank
   Shared<T> share() && {
     RootOnly<std::vector<std::byte>> sent = then([&](const T& value) {
       return communicator_.size() > 1 ? bytes_of(value) : std::vector<std::byte>();
@@ -99,8 +100,8 @@ class [[nodiscard]] RootOnly {
     return Shared<T>(std::move(*value_));
   }
 
-  /// On rank 0, once it is confirmed. A defect of the caller (check()) elsewhere and before: there
-  /// rank 0 alone would throw.
+  /// The value on rank 0, once it is confirmed. Calling it elsewhere or earlier is a defect
+  /// (check()): there rank 0 alone would throw.
   /// \test RootOnly.CanBeReadOnRankZeroAlone
   [[nodiscard]] const T& value() const {
     require_value();
@@ -135,7 +136,7 @@ RootOnly<std::remove_cvref_t<std::invoke_result_t<Make>>> on_root(const Communic
   return {communicator, std::forward<Make>(make)};
 }
 
-/// Collective. Rank 0 alone calls `work`; what it throws, every rank throws.
+/// Collective. Only rank 0 calls `work`, and what it throws, every rank throws.
 template <typename Work>
 void do_on_root(const Communicator& communicator, Work&& work) {
   all_or_none(communicator, [&] {

@@ -75,7 +75,7 @@ bool is_stop_requested(const Communicator& communicator) {
 std::string stop_reason() {
   if (stop_signal == SIGTERM) return "SIGTERM";
   if (stop_signal != 0) return "SIGUSR1";
-  // Another rank, which began a little earlier, may have asked.
+  // Another rank, which started a little earlier, may have asked.
   constexpr double kStartsWithinHours = 1.0 / 60.0;
   if (hours_since_start() + kStartsWithinHours < limits.max_hours) return {};
   std::ostringstream text;

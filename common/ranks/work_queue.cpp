@@ -51,7 +51,7 @@ class Ledger {
     const std::scoped_lock lock(mutex_);
     return take(1);
   }
-  /// No further items are handed out.
+  /// From now on no items are handed out.
   void stop() {
     const std::scoped_lock lock(mutex_);
     next_ = count_;
@@ -80,16 +80,16 @@ class Ledger {
   std::int64_t done_ = 0;
 };
 
-/// The message by which a worker asks for work: how many items it has finished since the last one,
-/// and whether one failed.
+/// The message by which a worker asks for work. It says how many items it has finished since the
+/// last one, and whether one failed.
 struct Request {
   std::int64_t finished = 0;
   std::int64_t has_failed = 0;
 };
 
-/// Answers one request when there is one; `active_workers` falls when a worker gets no more work.
-/// This uses messages, not one-sided windows: those fail across hosts over TCP, or stall while the
-/// target computes.
+/// Answers one request when there is one. `active_workers` falls when a worker gets no more work.
+/// This uses messages instead of one-sided windows, which fail across hosts over TCP, or stall
+/// while the target computes.
 bool answer_request(MPI_Comm handle, Ledger& ledger, int& active_workers) {
   int arrived = 0;
   MPI_Status status;
@@ -133,7 +133,7 @@ RankFailure run_as_manager(const Communicator& communicator, const Job& job) {
   });
   int active_workers = communicator.size() - 1;
   std::int64_t reported = 0;
-  // The other ranks wait for their grants, whatever happens here.
+  // The other ranks wait for their grants whatever happens here.
   const auto report_progress = [&] {
     const std::int64_t done = ledger.done();
     if (!job.on_progress || done <= reported || failure_of_report.exit_code != 0) return;

@@ -21,8 +21,8 @@ namespace af {
 
 namespace {
 
-/// Written and read letter by letter, without a lock. It serves messages only, so a text that is
-/// half old and half new does no harm.
+/// Text that is written and read letter by letter, without a lock. It serves messages only, so a
+/// text that is half old and half new does no harm.
 class SharedText {
  public:
   void set(std::string_view text) {
@@ -44,15 +44,16 @@ class SharedText {
   std::array<std::atomic<char>, 255> letters_{};
 };
 
-/// What one rank is doing, seen by the others of its host.
+/// What one rank is doing. The others of its host see it.
 struct RankNote {
-  std::atomic<std::int64_t> since_ns = 0;        ///< the last progress; 0: nothing in work
-  std::atomic<std::int64_t> limit_ns = 0;        ///< of what is in work; 0: the watchdog's own
-  std::atomic<std::int64_t> waits_since_ns = 0;  ///< in a call that waits for others; 0: not
-  std::atomic<std::int64_t> ticked_ns = 0;       ///< when its own watchdog last ran; 0: not watched
+  std::atomic<std::int64_t> since_ns = 0;  ///< the last progress; 0: nothing in work
+  std::atomic<std::int64_t> limit_ns = 0;  ///< limit for what is in work; 0: the watchdog's own
+  std::atomic<std::int64_t> waits_since_ns =
+      0;  ///< when it began to wait for others in a call; 0: it does not
+  std::atomic<std::int64_t> ticked_ns = 0;  ///< when its own watchdog last ran; 0: not watched
   std::int32_t rank = 0;
   std::int32_t process = 0;
-  std::atomic<bool> has_reported = false;  ///< of the first rank of a host: why the job ends
+  std::atomic<bool> has_reported = false;  ///< the first rank of a host has said why the job ends
   SharedText what;
 };
 static_assert(std::atomic<std::int64_t>::is_always_lock_free, "shared between processes");
@@ -60,12 +61,12 @@ static_assert(std::atomic<char>::is_always_lock_free, "shared between processes"
 
 RankNote own_note;
 std::atomic<RankNote*> my_note = &own_note;
-std::atomic<RankNote*> first_note = &own_note;  ///< of this host
+std::atomic<RankNote*> first_note = &own_note;  ///< the first note of this host
 std::mutex text_mutex;                          ///< rank 0 computes in a second thread
 std::string text_now;
 thread_local std::string failed_unit;
 
-/// The same clock in all processes of a host.
+/// A clock that all processes of a host share.
 std::int64_t now_ns() {
   return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
 }
@@ -81,12 +82,12 @@ std::string set_text(const std::string& what) {
 
 constexpr double kNsPerMinute = 60e9;
 
-// In limits. A thread of a busy machine may be late, but not by as much as this. And when no rank
-// of a host works, the host of the stuck rank has had the time to report it.
+// In limits. A thread of a busy machine may be late, but not by as much as this. When no rank of a
+// host works, the host of the stuck rank has had the time to report it.
 constexpr std::int64_t kPatienceWithStopped = 2;
 constexpr std::int64_t kPatienceWithHosts = 3;
 
-/// Of more than a year, a year.
+/// Limits more than a year to a year.
 std::int64_t nanoseconds_of(double minutes) {
   constexpr double kMinutesPerYear = 525600.0;
   return static_cast<std::int64_t>(std::min(minutes, kMinutesPerYear) * kNsPerMinute);
@@ -133,7 +134,7 @@ void WorkNote::change(const std::string& what) {
 void note_progress() {
   RankNote& note = *my_note;
   std::int64_t since_ns = note.since_ns;
-  // Another thread may end the work meanwhile; then it must not begin again.
+  // Another thread may end the work meanwhile. It must not begin again then.
   while (since_ns != 0 && !note.since_ns.compare_exchange_weak(since_ns, now_ns())) {
   }
 }
@@ -143,7 +144,8 @@ WaitNote::WaitNote() : before_((*my_note).waits_since_ns) {
 }
 
 WaitNote::~WaitNote() {
-  note_progress();  // first: a rank that waits no more must not look as if it had worked since
+  note_progress();  // first: a rank that has stopped waiting must not look as if it had worked
+                    // since
   (*my_note).waits_since_ns = before_;
 }
 
@@ -221,10 +223,10 @@ void StallWatch::watch(const std::stop_token& is_over) {
   std::int64_t watched_since_ns = last_tick_ns;
   std::mutex own;
   std::unique_lock lock(own);
-  std::condition_variable_any ended;  // woken by the end: a program does not wait for a tick
+  std::condition_variable_any ended;  // the end wakes it: a program does not wait for a tick
   while (!ended.wait_for(lock, is_over, to_tick, [&] { return is_over.stop_requested(); })) {
     const std::int64_t tick = now_ns();
-    // A batch system may stop and continue whole jobs: that time does not count.
+    // A batch system may stop and continue whole jobs. That time does not count.
     if (tick - last_tick_ns > limit_ns_ / 2) watched_since_ns = tick;
     last_tick_ns = tick;
     (*my_note).ticked_ns = tick;
@@ -234,8 +236,8 @@ void StallWatch::watch(const std::stop_token& is_over) {
   (*my_note).ticked_ns = 0;
 }
 
-// `now` is the time of the tick. A later reading would count time for which the job was stopped in
-// between.
+// `now` is the time of the tick. A later reading would include time for which the job was stopped
+// in between.
 
 /// The rank that has been stuck for longest: busy with one thing for too long without waiting, or
 /// not running at all (stopped), wherever it was then.
@@ -248,7 +250,7 @@ std::optional<StallWatch::Stuck> StallWatch::longest_stuck(std::int64_t now,
   for (const RankNote& note : board_->notes) {
     const std::int64_t own_limit = note.limit_ns;
     const std::int64_t limit = own_limit == 0 ? limit_ns_ : std::min(own_limit, limit_ns_);
-    // A waiting rank is not stuck. A busy machine makes a thread wait, too, but not for as long as
+    // A waiting rank is not stuck. A busy machine also makes a thread wait, but not for as long as
     // this.
     const std::int64_t works_ns = note.waits_since_ns != 0 ? 0 : age_of(note.since_ns);
     const std::int64_t still_ns = age_of(note.ticked_ns);
@@ -260,7 +262,7 @@ std::optional<StallWatch::Stuck> StallWatch::longest_stuck(std::int64_t now,
   return longest;
 }
 
-/// For how long all ranks of this host have been waiting for others; 0 when one of them works.
+/// How long all ranks of this host have been waiting for others; 0 when one of them works.
 std::int64_t StallWatch::all_wait_ns(std::int64_t now, std::int64_t watched_since_ns) const {
   std::int64_t shortest = std::numeric_limits<std::int64_t>::max();
   for (const RankNote& note : board_->notes) {

@@ -15,9 +15,9 @@
 
 namespace af {
 
-/// "casting unit 17 of 96": what this rank works on as long as the note lives. Notes nest; the
-/// innermost counts. An exception that passes a unit's note is reported with its text
-/// (failure_of()), one that passes only a phase's is not.
+/// "casting unit 17 of 96": what this rank works on as long as the note lives. Notes nest, and the
+/// innermost counts. An exception that passes a unit's note is reported with the note's text
+/// (failure_of()). One that passes only a phase's note is not.
 class WorkNote {
  public:
   enum class Kind { Phase, Unit };
@@ -41,11 +41,11 @@ class WorkNote {
   bool limit_is_of_outer_;
 };
 
-/// A unit that takes long has made progress.
+/// Notes that a long unit has made progress.
 void note_progress();
 
-/// As long as the note lives, this rank is in a call that waits for other ranks. If that takes
-/// long, other ranks are stuck.
+/// While the note lives, this rank is in a call that waits for other ranks. If that takes long,
+/// other ranks are stuck.
 class WaitNote {
  public:
   WaitNote();
@@ -57,16 +57,17 @@ class WaitNote {
   std::int64_t before_;
 };
 
-/// The unit that the exception just caught in this thread has left, once; empty when there is none.
+/// The unit that the exception just caught in this thread has left. Returned once; empty when there
+/// is none.
 std::string take_failed_unit();
 
-/// Whether this rank is the one that reports why the job ends: the first of its host that asks, if
-/// there is a StallWatch.
+/// Whether this rank reports why the job ends. That is the first of its host to ask, if there is a
+/// StallWatch.
 bool claim_report();
 
-/// Calls `on_end`, which must end the process, when it lives for longer than a limit: for the
-/// moments in which ranks wait for each other and no StallWatch sees them, while that one is made
-/// and unmade and while MPI ends. Time for which the whole job is stopped does not count.
+/// Calls `on_end`, which must end the process, when it lives for longer than a limit. It covers the
+/// moments in which ranks wait for each other and no StallWatch sees them: while that one is made
+/// and destroyed, and while MPI ends. Time for which the whole job is stopped does not count.
 /// \test Faults.ARankThatIsStoppedWhileOthersEndDoesNotKeepTheJob
 class WaitAlarm {
  public:
@@ -82,9 +83,9 @@ class WaitAlarm {
 
 /// Watches the ranks of every host from a thread of each rank. When a rank makes no progress, for
 /// whatever reason (it computes for ever, hangs in the file system, is stopped), `on_stall` is
-/// called on one rank of its host with a text that names rank, host and unit; it must end the job.
-/// When a process is stopped, its own watching thread stands still, too; the other ranks of its
-/// host find it, also when it was waiting.
+/// called on one rank of its host, with a text that names rank, host and unit. It must end the job.
+/// When a process is stopped, its own watching thread stands still too, but the other ranks of its
+/// host find it, even if it was waiting.
 /// \test WorkWatch.NamesTheRankThatIsStuckNotThoseThatWaitForIt
 class StallWatch {
  public:

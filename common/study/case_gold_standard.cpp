@@ -16,11 +16,12 @@ using nlohmann::json;
 
 namespace {
 
-// The Monte Carlo estimate shall not change with the seed of the starts.
+// The Monte Carlo estimate must not change with the seed of the starts.
 constexpr std::uint64_t kUncertaintySeed = 1;
 
-// Cells of the target box for it: a thousandth of the work of 1 mm voxels. The mean distance of a
-// rigid motion over a cell is that at its centre up to second order in angle times cell.
+// The cells of the target box for the estimate. They take a thousandth of the work of 1 mm voxels.
+// The mean distance of a rigid motion over a cell is that at its centre, up to second order in
+// angle times cell.
 constexpr double kUncertaintySpacingMm = 6.0;
 
 std::vector<FiducialView> fiducial_views(const Study& study, const StudyCase& study_case) {

@@ -18,7 +18,7 @@ namespace {
 
 constexpr const char* kPrefix = "ct_";
 
-/// Sets a field from its key, where that is there.
+/// Sets a field from its key, if the key is there.
 struct SetFromKey {
   TomlTableReader& reader;
   std::string key;
@@ -82,7 +82,7 @@ CtReadOptions read_ct_keys(TomlTableReader& reader) {
 
 namespace {
 
-/// The options that differ from what is usual.
+/// The options that differ from the default.
 OptionTexts stated_texts(const CtReadOptions& reading) {
   const OptionTexts usual = option_texts(to_toml(CtReadOptions()));
   OptionTexts stated;
@@ -93,7 +93,7 @@ OptionTexts stated_texts(const CtReadOptions& reading) {
   return stated;
 }
 
-/// Those of the texts that are CtReadOptions, as keys of a study.
+/// The texts that are CtReadOptions, as keys of a study.
 std::string keys_of(const OptionTexts& texts) {
   std::set<std::string> names;
   CtReadOptions reading;

@@ -20,7 +20,7 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using RowMajorMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
-/// x' = A (x - c) + c + t, c the fixed parameters (itk::MatrixOffsetTransformBase).
+/// x' = A (x - c) + c + t, where c is the fixed parameters (itk::MatrixOffsetTransformBase).
 struct ItkTransform {
   std::string type;  ///< "Euler3DTransform_double_3_3"
   std::vector<double> parameters;
@@ -44,7 +44,7 @@ Matrix3d rotation_of_versor(const ItkTransform& transform, const std::string& fi
       .toRotationMatrix();
 }
 
-/// Vector part first; ITK divides by the norm.
+/// The vector part comes first. ITK divides by the norm.
 Matrix3d rotation_of_quaternion(const ItkTransform& transform, const std::string& file) {
   const double* const q = transform.parameters.data();
   const Eigen::Quaterniond quaternion(q[3], q[0], q[1], q[2]);
@@ -72,7 +72,7 @@ Matrix3d no_rotation(const ItkTransform& /*transform*/, const std::string& /*fil
   return Matrix3d::Identity();
 }
 
-/// Translations are the last three parameters, where a type has any.
+/// Translations are the last three parameters, if a type has any.
 struct ItkType {
   const char* name;
   std::size_t parameters;
@@ -116,8 +116,8 @@ std::map<std::string, std::string> itk_fields(const std::string& text, const std
   return fields;
 }
 
-/// The map of the points that the transform maps, as rigid transform. InputError for other types
-/// and for ones that are not rigid; FileError for wrong numbers of parameters.
+/// The map of points by the transform, as a rigid transform. Throws InputError for other types and
+/// for transforms that are not rigid, FileError for wrong numbers of parameters.
 RigidTransform map_of_itk_transform(const ItkTransform& transform, const std::string& file) {
   const std::string name = transform.type.substr(0, transform.type.find('_'));
   const ItkType* const type = find_row(kItkTypes, name);

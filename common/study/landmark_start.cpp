@@ -15,7 +15,7 @@ bool shows_one(const StudyView& view) {
                              [](const auto& point) { return point.has_value(); });
 }
 
-/// What a residual means for a start: how well marks of one pose agree, in mm at their places.
+/// What a residual means for a start: how well the marks agree on one pose, in mm at their places.
 std::string marks_verdict(const LandmarkPose& pose, const StudyCase& study_case) {
   /// A registration this near counts as a success.
   constexpr double kSuccessMm = 2.5;

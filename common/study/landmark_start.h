@@ -12,14 +12,14 @@ namespace af {
 /// Whether a case states landmarks and any view shows one.
 bool has_landmarks(const StudyCase& study_case);
 
-/// The pose that a case's landmarks give, the nominal one choosing where several fit
-/// (pose_from_landmarks()). InputError that names the case when it has none, or too few.
+/// The pose that a case's landmarks give. The nominal pose decides where several fit
+/// (pose_from_landmarks()). Throws InputError that names the case when it has none, or too few.
 LandmarkPose landmark_pose(const Study& study, const StudyCase& study_case);
-/// The same of a case of any study with this rig.
+/// The same for a case of any study with this rig.
 LandmarkPose landmark_pose(const CameraRig& rig, const StudyCase& study_case);
 
-/// How far each landmark is from where each view saw it, in px and mm, and the notes: lines of
-/// text, and JSON.
+/// How far each landmark is from where each view saw it, in px and mm, and the notes, as lines of
+/// text and as JSON.
 std::string residuals_text(const LandmarkPose& pose, const StudyCase& study_case);
 nlohmann::json to_json(const LandmarkPose& pose, const StudyCase& study_case);
 

@@ -45,8 +45,8 @@ bool is_comment(const std::vector<std::string>& words) {
   return words.front().starts_with('#');
 }
 
-/// "[a, b]" of words from `first` on; empty when one is no number. Infinite ones are the reader's
-/// to refuse, by the name of their key.
+/// "[a, b]" of words from `first` on; empty when one is no number. The reader refuses infinite ones
+/// itself, by the name of their key.
 std::string list_of(const std::vector<std::string>& words, std::size_t first, std::size_t count) {
   std::string list;
   for (std::size_t i = first; i < first + count; ++i) {

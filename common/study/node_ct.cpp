@@ -15,7 +15,7 @@ namespace af {
 
 namespace {
 
-/// What rank 0 tells the others of the CT that it reads.
+/// What rank 0 tells the others about the CT that it reads.
 struct FoundInCt {
   CtFacts facts;
   CtGrid bordered;  ///< of its attenuation

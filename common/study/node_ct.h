@@ -23,12 +23,12 @@ struct NodeCt {
   CtFacts facts;
 };
 
-/// The CT of a case. Errors as read_ct(), with the study's line, and as require_target_in_ct().
+/// The CT of a case. Throws as read_ct(), with the study's line, and as require_target_in_ct().
 CtVolume read_case_ct(const StudyCase& study_case, std::vector<std::string>* warnings = nullptr);
 
-/// Collective. Rank 0 reads the CT, the other nodes get the voxels; errors as read_ct(), on every
-/// rank. Ranks hold the voxels that their node shares, and no more, but for rank 0: it holds the
-/// file's values and the CT as int16 while it reads, then the CT while it fills the voxels.
+/// Collective. Rank 0 reads the CT, and the other nodes get the voxels. Throws as read_ct(), on
+/// every rank. Ranks hold only the voxels that their node shares. Rank 0 also holds the file's
+/// values and the CT as int16 while it reads, then the CT while it fills the voxels.
 NodeCt read_ct_per_node(const std::filesystem::path& path,
                         const CtReadOptions& options,
                         const AttenuationModel& model,
@@ -48,7 +48,7 @@ std::shared_ptr<const AttenuationVolume> volume_per_node(
     const Communicator& communicator);
 
 /// Collective. The part of a CT's attenuation that is bone (bone_volume()), held once per node.
-/// InputError when there is none.
+/// Throws InputError when there is none.
 std::shared_ptr<const AttenuationVolume> bone_per_node(const AttenuationVolume& volume,
                                                        const Communicator& communicator);
 

@@ -13,11 +13,11 @@
 
 namespace af {
 
-/// What poses of a file are of.
+/// What the poses of a file belong to.
 struct PoseContext {
   /// What six numbers (rx_deg ... tz_mm) of a table are relative to.
   std::optional<PoseFrame> frame;
-  /// Of af-convert, for files of other programs: "--study STUDY --case CASE", or "--ct CT".
+  /// Options of af-convert, for files of other programs: "--study STUDY --case CASE", or "--ct CT".
   std::string conversion_options = {};
 };
 
@@ -43,8 +43,8 @@ struct PoseFormat {
   PosesInFile (*read)(const PoseFileBytes& file, const PoseContext& context);
 };
 
-/// The finite numbers of a text, separated by blanks, commas, semicolons or brackets. FileError
-/// that begins with `where` for anything else.
+/// The finite numbers of a text, separated by blanks, commas, semicolons or brackets. Throws
+/// FileError that begins with `where` for anything else.
 std::vector<double> numbers_of(std::string_view text, const std::string& where);
 
 /// The lines of a text without line ends, blank ones left out.

@@ -21,13 +21,13 @@ namespace {
 constexpr const char* kPoseKey = "room_from_ct";
 constexpr const char* kStartIndex = "start_index";
 
-/// What of a file is not read; no note for an empty list.
+/// Notes what of a file is not read. No note for an empty list.
 std::vector<std::string> notes_on(const std::vector<std::string>& unread, const std::string& file) {
   if (unread.empty()) return {};
   return {file + ": not read: " + joined(unread)};
 }
 
-/// A file without a format, as result.json states it, is not this project's.
+/// A file without a format, which result.json states, is not this project's.
 std::vector<std::string> unread_keys(const nlohmann::json& json) {
   std::vector<std::string> unread;
   for (const auto& [key, value] : json.items())
@@ -90,7 +90,7 @@ RigidTransform parameters_of_row(const CsvTable& table, std::size_t row, const P
   return pose_of_deg_and_mm(frame, values, table.where(row));
 }
 
-/// By its place, or as the table says of poses that others left gaps between.
+/// A row's place, or the number that the table states where other rows are missing.
 std::int64_t number_of_row(const CsvTable& table, std::size_t row) {
   if (!table.find_column(kStartIndex)) return static_cast<std::int64_t>(row + 1);
   constexpr double kMost = 1e9;

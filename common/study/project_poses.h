@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The project's own ways to write a pose: room_from_ct as JSON, TOML and CSV.
+// The project's own ways of writing a pose: room_from_ct as JSON, TOML and CSV.
 #pragma once
 
 #include "study/pose_format.h"

@@ -20,7 +20,7 @@ bool is_there(const fs::path& path) {
   return fs::status(path, ignored).type() != fs::file_type::not_found;
 }
 
-/// A damaged rig.toml is one, too: its reader says where it goes wrong.
+/// A damaged rig.toml counts as one, because its reader says where it goes wrong.
 bool is_rig_toml(const fs::path& path, const std::string& text) {
   return !has_foreign_mark(text) &&
          (path.extension() == ".toml" || text.find("[[camera]]") != std::string::npos);

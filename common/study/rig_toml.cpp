@@ -42,8 +42,8 @@ pixel_spacing_mm = [1.190625, 1.190625]
 size_px = [256, 256]
 )";
 
-/// Its numbers are 2600 and 1000 mm times +-sqrt(1/2), and from there half the outermost pixel
-/// centres' span, 102.2 mm, against each of the detector's axes.
+/// Its numbers are 2600 and 1000 mm times +-sqrt(1/2). From there, half the span of the outermost
+/// pixel centres, 102.2 mm, is subtracted along each of the detector's axes.
 constexpr const char* kTreatmentRoomText =
     R"(# A radiotherapy treatment room: two fixed cameras above the patient, at +-45 degrees in the axial plane and so
 # orthogonal; source to isocentre 2600 mm, source to detector 3600 mm.
@@ -77,7 +77,7 @@ const std::map<std::string, const char*>& builtin_rigs() {
 constexpr std::array kGeometryKeys = {
     "source_point", "detector_origin_point", "column_direction", "row_direction"};
 
-/// The camera's constraints that geometry knows, each placed at the line of its key.
+/// The camera's constraints that geometry knows, each reported at the line of its key.
 bool note_geometry_problems(const CameraGeometry& camera,
                             const toml::table& table,
                             TomlProblems& problems) {
@@ -131,7 +131,7 @@ std::optional<CameraGeometry> camera_from_keys(TomlTableReader& reader,
   return camera;
 }
 
-/// distortion = [k1, k2, p1, p2], or five or eight, as OpenCV orders them.
+/// distortion = [k1, k2, p1, p2], or five or eight numbers, in OpenCV's order.
 LensDistortion read_distortion(TomlTableReader& reader) {
   constexpr const char* kKey = "distortion";
   LensDistortion distortion;
@@ -159,21 +159,22 @@ using CameraMaker = std::optional<CameraGeometry> (*)(TomlTableReader& reader,
                                                       const Eigen::Vector3d& isocenter_point,
                                                       TomlProblems& problems);
 
-/// A way of stating a camera, told by a key that only it has.
+/// A way of stating a camera, recognised by a key that only it has.
 struct CameraForm {
   const char* key;
   CameraMaker make;
 };
 
-/// Every form there is; a new one joins here. The first is that of tables without such a key, and
-/// the one in which rigs are written.
+/// Every form. A new one is added here. The first is for tables without such a key, and the one in
+/// which rigs are written.
 constexpr std::array kCameraForms = {
     CameraForm{"source_point", camera_from_keys},
     CameraForm{"projection_matrix", camera_from_matrix},
 };
 
 const CameraForm& form_of(TomlTableReader& reader) {
-  // From the last, because keys of the first beside another form are an error of that form.
+  // The last form comes first, because keys of the first beside another form are an error of that
+  // form.
   for (auto form = kCameraForms.rbegin(); form != kCameraForms.rend(); ++form)
     if (reader.has(form->key)) return *form;
   return kCameraForms.front();
@@ -199,7 +200,7 @@ std::optional<CameraGeometry> read_camera(const toml::table& table,
   reader.refuse_unknown_keys();
   if (!camera || !name) return std::nullopt;
   camera->distortion = stated.distortion;
-  // Missing sizes stand in as ones, so that the rest is checked too.
+  // Ones stand in for missing sizes, so that the rest is checked too.
   if (!note_geometry_problems(*camera, table, problems) || !spacing || !size) return std::nullopt;
   clean_axes(*camera);
   return camera;

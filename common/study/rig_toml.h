@@ -14,9 +14,9 @@ std::vector<std::string> builtin_rig_names();
 /// TOML text of a shipped rig.
 std::string builtin_rig_text(const std::string& name);
 
-/// A rig from its TOML text; messages name `file`. InputError (exit 3) for a bad rig: names file,
-/// line, camera, key, value, constraint; FileError (exit 4) when it is not TOML. `warnings`
-/// receives e.g. "camera 'A': mirrored ...".
+/// A rig from its TOML text; messages name `file`. Throws InputError (exit 3) for a bad rig, naming
+/// file, line, camera, key, value and constraint, FileError (exit 4) when it is not TOML.
+/// `warnings` receives e.g. "camera 'A': mirrored ...".
 CameraRig parse_rig(const std::string& text,
                     const std::string& file,
                     std::vector<std::string>* warnings = nullptr);
@@ -25,11 +25,11 @@ CameraRig parse_rig(const std::string& text,
 std::string rig_to_toml(const CameraRig& rig);
 
 /// Axes within the tolerance of problems() are made exactly unit and orthogonal, so that projecting
-/// and casting agree; axes that already are keep their bits.
+/// and casting agree. Axes that already are keep their bits.
 void clean_axes(CameraGeometry& camera);
 
-/// What a camera name must be so that it can be part of options (--field NAME=PATH) and of file
-/// names; empty when it is.
+/// The rule for a camera name that it breaks, so that it can be part of options (--field NAME=PATH)
+/// and of file names. Empty when it breaks none.
 std::string camera_name_problem(const std::string& name);
 
 }  // namespace af

@@ -25,15 +25,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What reading any part of a study needs to know.
+/// What every part of a study needs to know when it is read.
 struct StudyContext {
   fs::path folder;  ///< absolute; paths of the study are relative to it
   const CameraRig& rig;
   TomlProblems& problems;
 };
 
-/// Without "." and doubled slashes. A ".." stays: removing it as text would be wrong behind a
-/// symbolic link.
+/// Removes "." and doubled slashes. A ".." stays, because removing it as text would be wrong behind
+/// a symbolic link.
 fs::path tidied(const fs::path& path) {
   const bool goes_up = std::find(path.begin(), path.end(), "..") != path.end();
   return goes_up ? path : path.lexically_normal();
@@ -43,7 +43,7 @@ fs::path resolved(const fs::path& folder, const std::string& path) {
   return tidied(folder / path);
 }
 
-/// Its place goes to `places`.
+/// Notes the path's place in `places`.
 std::optional<fs::path> get_path(TomlTableReader& reader,
                                  const char* key,
                                  Presence presence,
@@ -66,8 +66,8 @@ std::vector<Eigen::Matrix<double, Size, 1>> get_points(TomlTableReader& reader,
   return points;
 }
 
-/// True when the points lie on one line (or are fewer than three): a rotation about that line would
-/// stay free.
+/// True when the points lie on one line (or are fewer than three), which would leave a rotation
+/// about that line free.
 bool are_collinear(const std::vector<Eigen::Vector3d>& points) {
   if (points.size() < 3) return true;
   Eigen::Matrix3Xd centered(3, static_cast<Eigen::Index>(points.size()));
@@ -77,7 +77,7 @@ bool are_collinear(const std::vector<Eigen::Vector3d>& points) {
   const Eigen::Vector3d singular_values =
       Eigen::JacobiSVD<Eigen::Matrix3d, Eigen::NoQRPreconditioner>(centered * centered.transpose())
           .singularValues();
-  // The second largest extent against the largest, as variances.
+  // The second largest extent relative to the largest, as variances.
   constexpr double kLeastWidth = 1e-3;
   return !(singular_values[1] > kLeastWidth * kLeastWidth * singular_values[0]);
 }
@@ -144,7 +144,7 @@ void check_fiducials(TomlTableReader& reader,
     }
 }
 
-/// mask = "auto", a file, or both in a list; a file of that name is "./auto".
+/// mask = "auto", a file, or both in a list. A file with that name is "./auto".
 void read_mask_key(TomlTableReader& reader, const fs::path& folder, StudyView& view) {
   constexpr const char* kKey = "mask";
   if (!reader.has(kKey)) return;
@@ -174,8 +174,8 @@ std::string mask_text(const StudyView& view,
   return file.empty() ? "mask = \"auto\"\n" : "mask = [\"auto\", " + file + "]\n";
 }
 
-/// One entry of landmarks_px: a point, or [] or [nan, nan] for what is not visible. False when it
-/// is neither.
+/// One entry of landmarks_px: a point, or [] or [nan, nan] for one that is not visible. False when
+/// it is neither.
 bool get_landmark(const toml::node& node, std::optional<Eigen::Vector2d>& point) {
   const toml::array* const numbers = node.as_array();
   if (numbers == nullptr || (!numbers->empty() && numbers->size() != 2)) return false;
@@ -226,7 +226,7 @@ std::vector<std::optional<Eigen::Vector2d>> get_landmarks(TomlTableReader& reade
   return points;
 }
 
-/// Points are stated in the stored X-ray; from here on they are those of the undistorted one.
+/// Points are stated in the stored X-ray. From here on they refer to the undistorted one.
 void undistort_points(TomlTableReader& reader, const CameraGeometry& camera, StudyView& view) {
   if (camera.distortion.is_none()) return;
   const PixelDistortion distortion(camera);
@@ -299,7 +299,7 @@ void read_views(TomlTableReader& reader,
   }
 }
 
-/// Without a stated pose the target's centre lies at the isocentre, with the patient's axes along
+/// Without a stated pose, the target's centre lies at the isocentre and the patient's axes along
 /// the room's.
 RigidTransform pose_at_isocenter(const CameraRig& rig, const StudyCase& study_case) {
   return PoseFrame{Eigen::Matrix3d::Identity(), study_case.center_ct_mm, rig.isocenter_point}
@@ -326,7 +326,7 @@ void check_beams(TomlTableReader& reader,
   }
 }
 
-/// A case that states landmarks and no nominal pose has the landmarks' pose as nominal one.
+/// A case that states landmarks and no nominal pose takes the landmarks' pose as its nominal one.
 void take_nominal_from_landmarks(TomlTableReader& reader,
                                  const StudyContext& context,
                                  StudyCase& study_case) {
@@ -388,7 +388,7 @@ void read_cases(TomlTableReader& reader, Study& study, const StudyContext& conte
   }
 }
 
-/// The rig's shipped name, or the paths of its files made absolute.
+/// The rig's shipped name, or the absolute paths of its files.
 std::string resolved_rig(const std::string& rig, const fs::path& folder) {
   // A comma in the name of one file does not make it two.
   if (fs::exists(resolved(folder, rig))) return resolved(folder, rig).string();

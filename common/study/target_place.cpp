@@ -13,7 +13,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-/// The smallest axis-aligned box about the images of a box's corners.
+/// The smallest axis-aligned box around the images of a box's corners.
 template <typename Image>
 CtBox box_about(const CtBox& box, const Image& image_of) {
   CtBox result{Vector3d::Constant(std::numeric_limits<double>::infinity()),
@@ -31,7 +31,7 @@ bool are_apart(const CtBox& a, const CtBox& b) {
          (b.low_mm.array() > a.high_mm.array()).any();
 }
 
-/// All voxels of a grid to their outer edges, in indices.
+/// All voxels of a grid including their outer halves, in indices.
 CtBox index_box(const CtGrid& grid) {
   const Vector3d size(grid.size[0], grid.size[1], grid.size[2]);
   return {Vector3d::Constant(-0.5), size - Vector3d::Constant(0.5)};

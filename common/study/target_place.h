@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whether a case's target can be seen at all: before anything is rendered or registered.
+// Tests whether a case's target can be seen at all, before anything is rendered or registered.
 #pragma once
 
 #include <string>
@@ -9,14 +9,15 @@
 
 namespace af {
 
-/// The axis-aligned box in the ct frame (mm) that holds all voxels to their outer edges.
+/// The axis-aligned box in the ct frame (mm) that holds all voxels including their outer halves.
 CtBox bounding_box(const CtGrid& grid);
 
 /// Why the target box cannot be seen at the case's nominal pose: all of it lies behind the source
 /// or beside the detector. Empty when some of it is in the beam.
 std::string beam_problem(const StudyCase& study_case, const CameraGeometry& camera);
 
-/// InputError, with the study's line, when the target box and the CT have no point in common.
+/// Throws InputError, with the study's line, when the target box and the CT have no point in
+/// common.
 /// \test StudyFile.ATargetBoxOutsideTheCtIsRefused
 void require_target_in_ct(const StudyCase& study_case, const CtGrid& ct);
 

@@ -23,19 +23,20 @@ namespace {
 
 /// Share of pixels that are no brighter than what counts as the open beam.
 constexpr double kOpenBeamShare = 0.999;
-/// Of the camera's pixel spacing; decimal strings are rounded, and detectors are measured to this.
+/// Share of the camera's pixel spacing. Decimal strings are rounded, and detectors are measured to
+/// this.
 constexpr double kMaxSpacingShare = 0.01;
-/// Of the region of interest, hidden by an automatic mask: more is a mistake of the mask.
+/// Share of the region of interest that an automatic mask may hide. More is a mistake of the mask.
 constexpr double kMostHidden = 0.5;
-/// Of the pixels of a flat field that are not brighter than the dark image.
+/// Share of a flat field's pixels that may be no brighter than the dark image.
 constexpr double kMostDeadPixels = 0.25;
 
 struct LoadedImage {
   Image2d image;
-  std::optional<Eigen::Vector2d> spacing_mm;  ///< of other formats than DICOM
+  std::optional<Eigen::Vector2d> spacing_mm;  ///< for formats other than DICOM
   std::optional<DicomXray> dicom;             ///< without its image and data
-  Image2d data;                               ///< 0 where a pixel is padding; empty: none is
-  std::string note;                           ///< of reading other formats
+  Image2d data;                               ///< 0 where a pixel is padding; empty without padding
+  std::string note;                           ///< for formats other than DICOM
 };
 
 LoadedImage load(const std::filesystem::path& path, std::optional<int> frame) {
@@ -75,7 +76,7 @@ bool is_spacing_of(const CameraGeometry& camera, const Eigen::Vector2d& spacing_
       .all();
 }
 
-/// 1 x 1 mm is what formats write for a spacing that nobody has set.
+/// Formats write 1 x 1 mm for a spacing that nobody has set.
 void check_spacing(const LoadedImage& loaded,
                    const StudyView& view,
                    const CameraGeometry& camera,
@@ -100,7 +101,7 @@ void check_spacing(const LoadedImage& loaded,
   std::optional<Eigen::Vector2d> in_patient_mm;
   try {
     in_patient_mm = xray_pixel_spacing_mm(*loaded.dicom);
-  } catch (const InputError& error) {  // it would only be warned of
+  } catch (const InputError& error) {  // this would only be a warning
     warnings.push_back(std::string(error.what()) + "; not checked");
   }
   if (in_patient_mm && !is_spacing_of(camera, *in_patient_mm))
@@ -110,7 +111,7 @@ void check_spacing(const LoadedImage& loaded,
                        " (no ImagerPixelSpacing: it may be that of a plane in the patient)");
 }
 
-/// What is known of a file's values besides them, in the order in which it is done.
+/// What is known of a file's values and done to them, in the order in which it is done.
 class Note {
  public:
   void add(const std::string& what) { text_ += (text_.empty() ? "" : ", ") + what; }
@@ -165,7 +166,7 @@ void check_relationship(const DicomXray& dicom,
     warnings.push_back(file + ": Modality = " + dicom.modality + " is no X-ray");
 }
 
-/// Whether stored values have to be turned round so that they rise with what `xray_domain` says.
+/// Whether stored values must be inverted so that they rise with what `xray_domain` says.
 bool is_turned(const LoadedImage& loaded, const StudyView& view) {
   if (view.reading.polarity != XrayPolarity::ByHeader)
     return view.reading.polarity == XrayPolarity::Inverted;
@@ -175,8 +176,8 @@ bool is_turned(const LoadedImage& loaded, const StudyView& view) {
   return loaded.dicom->is_monochrome1;
 }
 
-/// What values are subtracted from to turn them round: of DICOM by its stored bits; otherwise the
-/// least full scale of a detector that holds them all.
+/// The number from which values are subtracted to invert them. DICOM's stored bits give it;
+/// otherwise it is the least full scale of a detector that holds all values.
 double inversion_sum(const LoadedImage& loaded) {
   if (loaded.dicom) return loaded.dicom->inversion_sum;
   const auto most = static_cast<double>(
@@ -215,7 +216,7 @@ void check_values(const Image2d& image, const StudyView& view) {
         "pixels", "all " + std::to_string(first), "a constant image shows nothing", file);
 }
 
-/// Takes out of a mask what another one hides; empty ones hide nothing.
+/// Removes from a mask what another one hides. Empty ones hide nothing.
 void hide(Image2d& mask, const Image2d& shown) {
   if (mask.pixels.empty()) {
     mask = shown;
@@ -225,9 +226,9 @@ void hide(Image2d& mask, const Image2d& shown) {
     if (shown.pixels[i] == 0.0f) mask.pixels[i] = 0.0f;
 }
 
-/// The flat or dark image of a view, turned as its X-ray: by the same full scale, which a flat
+/// The flat or dark image of a view, inverted as its X-ray is: by the same full scale, which a flat
 /// field of inverted values, all small, does not show. `mask` loses its padding. `kept`: the file,
-/// which is read if it is not yet.
+/// which is read if it has not been yet.
 Image2d load_companion(const std::filesystem::path& path,
                        const StudyView& view,
                        const CameraGeometry& camera,
@@ -263,13 +264,13 @@ bool has_corrections(const StudyView& view) {
          (reading.flat || reading.dark || reading.dark_level != 0.0);
 }
 
-/// Files beside a view's X-ray that were read.
+/// The companion files of a view's X-ray that have been read.
 struct ReadCompanions {
   std::optional<LoadedImage> flat;
   std::optional<LoadedImage> dark;
 };
 
-/// Dark and flat fields of a view, where it has them; `mask` loses pixels without a beam.
+/// Applies the dark and flat fields of a view, if it has them. `mask` loses pixels without a beam.
 void correct_by_flat(const StudyView& view,
                      const CameraGeometry& camera,
                      std::optional<double> sum_of_xray,
@@ -389,9 +390,8 @@ double air_level(const Image2d& image,
               "99.9th percentile, the default: too low where no air is in view; see air_level");
 }
 
-/// Intensities of an attenuation image, up to scale: exp(-value), values beyond a few units of
-/// which (logarithms of an unknown scale) are taken on a scale of four units from air to the
-/// densest.
+/// Intensities of an attenuation image, up to scale: exp(-value). Values that exceed a few units
+/// (logarithms of an unknown scale) are first put on a scale of four units from air to the densest.
 Image2d intensities_of(const Image2d& attenuation) {
   constexpr double kUnits = 4.0;
   const auto low = static_cast<double>(nearest_rank(attenuation.pixels, 0.01));
@@ -407,7 +407,7 @@ XrayBorders borders_of(const Image2d& image, XrayDomain domain) {
   return find_xray_borders(domain == XrayDomain::Intensity ? image : intensities_of(image));
 }
 
-/// Looking for borders takes a while on large pictures.
+/// Borders are looked for only where needed, because that takes a while on large pictures.
 bool needs_borders(const StudyView& view, Background background) {
   const Background unexpected =
       view.xray_domain == XrayDomain::Intensity ? Background::Dark : Background::Bright;
@@ -451,7 +451,7 @@ double hidden_share(const Image2d& mask, const RegionOfInterest& roi) {
          static_cast<double>(part.pixels.size());
 }
 
-/// What an automatic mask hides, checked against the region of interest.
+/// Applies an automatic mask, checked against the region of interest.
 void use_borders(const XrayBorders& borders, const StudyView& view, Image2d& mask, Note& note) {
   note.add(borders.text());
   if (borders.is_any()) hide(mask, borders.mask);
@@ -465,7 +465,7 @@ void use_borders(const XrayBorders& borders, const StudyView& view, Image2d& mas
                      view.xray.string());
 }
 
-/// The mask as the camera without distortion sees it; refuses a distortion that leaves too little.
+/// The mask as the camera without distortion sees it. Refuses a distortion that leaves too little.
 void undistort_mask(const XrayUndistortion& undistortion,
                     const StudyView& view,
                     Image2d& mask,
@@ -490,8 +490,8 @@ Image2d read_mask_file(const StudyView& view, const CameraGeometry& camera) {
   return mask;
 }
 
-/// Padding gets the value of a border, so that what looks for borders finds none of another kind:
-/// the darkest of an intensity, the densest of an attenuation.
+/// Gives padding the value of a border, so that the search for borders finds none of another kind:
+/// the darkest intensity, or the densest attenuation.
 void darken_padding(XrayDomain domain, LoadedImage& loaded) {
   const std::vector<float> values = values_in(loaded.image, loaded.data);
   const auto [low, high] = std::minmax_element(values.begin(), values.end());
@@ -515,7 +515,7 @@ void check_padding(const LoadedImage& loaded, const StudyView& view, Note& note)
         view.xray.string());
 }
 
-/// The X-ray's values, rising with what `xray_domain` says, and what was done for that;
+/// The X-ray's values, rising with what `xray_domain` says, and notes on what was done for that.
 /// `inversion` is what they were subtracted from.
 LoadedImage oriented(LoadedImage loaded,
                      const StudyView& view,
@@ -600,7 +600,7 @@ ViewXray ViewXrayReader::prepared(const StudyView& view, const Load& load_xray) 
     }
     note_background(background, shown, view, borders, field, note, xray.warnings);
   });
-  // Flat and dark fields are of the detector's own pixels.
+  // Flat and dark fields consist of the detector's own pixels, so they come before undistortion.
   if (view.xray_domain == XrayDomain::Intensity)
     correct_by_flat(view, camera_, inversion, kept_->companions, image, xray.mask, note);
   if (undistortion)

@@ -18,17 +18,17 @@ struct ViewXray {
   std::vector<std::string> warnings;
 };
 
-/// The X-rays of one view, each prepared as the view's XrayReading says: that of the study, and
+/// The X-rays of one view, each prepared as the view's XrayReading says: the study's own, and
 /// others of the same camera. Mask, flat and dark fields are read with the first. For one thread at
-/// a time; copies share what was read.
+/// a time. Copies share what was read.
 class ViewXrayReader {
  public:
   ViewXrayReader(StudyView view, CameraGeometry camera);
 
   [[nodiscard]] const StudyView& view() const { return view_; }
-  /// As read_view_xray().
+  /// Like read_view_xray().
   [[nodiscard]] ViewXray read();
-  /// As if the view's file were one without a header and held these values. Errors as of read().
+  /// As if the view's file had no header and held these values. Throws as read() does.
   /// \test XrayReader.PreparesValuesAsTheFileThatHoldsThem
   [[nodiscard]] ViewXray prepared(Image2d values);
 
@@ -42,13 +42,14 @@ class ViewXrayReader {
   std::shared_ptr<Kept> kept_;
 };
 
-/// Reads a view's X-ray in the attenuation domain, as its XrayReading says. Intensities are turned
-/// by -log(I / I_open); I_open is the 99.9th percentile of the image unless the view says
-/// otherwise. MONOCHROME1, rescale and PixelIntensityRelationship of DICOM are honoured, windows
-/// are not. Images of a camera with distortion are undistorted behind flat and dark fields and
-/// before the logarithm; so are masks. Padding of DICOM is masked. InputError when the size or the
-/// pixel spacing is not the camera's, the image is constant, the air level cannot be found, an
-/// automatic mask hides most of the region, or the values are logarithms and called intensities.
+/// Reads a view's X-ray in the attenuation domain, as its XrayReading says. Intensities become
+/// -log(I / I_open), where I_open is the 99.9th percentile of the image unless the view says
+/// otherwise. DICOM's MONOCHROME1, rescale and PixelIntensityRelationship are honoured; windows are
+/// not. For a camera with distortion, images are undistorted after flat and dark fields and before
+/// the logarithm, and so are masks. DICOM's padding is masked.
+/// Throws InputError when the size or the pixel spacing is not the camera's, the image is constant,
+/// the air level cannot be found, an automatic mask hides most of the region, or the values are
+/// logarithms declared as intensities.
 ViewXray read_view_xray(const StudyView& view, const CameraGeometry& camera);
 
 }  // namespace af

@@ -11,29 +11,29 @@ namespace af {
 
 class TomlTableReader;
 
-/// What an X-ray's pixel values mean: detector intensity (bright = unattenuated; -log is taken on
-/// reading) or attenuation.
+/// What an X-ray's pixel values mean: detector intensity (bright = unattenuated; reading takes
+/// -log), or attenuation.
 enum class XrayDomain { Intensity, Attenuation };
 
 /// What the detector reads in the open beam.
 enum class AirSource {
-  NotAsked,           ///< as Percentile
+  NotAsked,           ///< like Percentile
   Percentile,         ///< 99.9th percentile of the picture
   OpenBeam,           ///< the brightest peak of the histogram
   CollimatedBorders,  ///< beside the edge of the collimated field
   Value
 };
 
-/// Whether an X-ray's values are turned round before `xray_domain` is applied.
+/// Whether an X-ray's values are inverted before `xray_domain` is applied.
 enum class XrayPolarity {
-  ByHeader,  ///< as a DICOM file says; other formats as stored
+  ByHeader,  ///< as a DICOM file says; other formats are taken as stored
   AsStored,
   Inverted
 };
 
 /// How a view's X-ray becomes line integrals: keys of [[case.view]].
 struct XrayReading {
-  std::optional<int> frame;  ///< of a multi-frame DICOM file, from 1
+  std::optional<int> frame;  ///< in a multi-frame DICOM file, from 1
   XrayPolarity polarity = XrayPolarity::ByHeader;
   AirSource air = AirSource::NotAsked;
   double air_level = 0.0;  ///< with AirSource::Value
@@ -52,12 +52,12 @@ struct XrayReading {
 /// Reads a path of the study and notes its place.
 using StudyPathReader = std::function<std::optional<std::filesystem::path>(const char* key)>;
 
-/// Reads the keys of XrayReading but `mask`; contradictions become problems of `reader`.
+/// Reads the keys of XrayReading except `mask`. Contradictions become problems of `reader`.
 XrayReading read_xray_keys(TomlTableReader& reader,
                            XrayDomain domain,
                            const StudyPathReader& read_path);
 
-/// The keys that are not as they are by default, but `mask`, one per line; paths through
+/// The keys that differ from their defaults, except `mask`, one per line. Paths go through
 /// `path_text`.
 std::string xray_keys_text(
     const XrayReading& reading,

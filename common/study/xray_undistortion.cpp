@@ -19,7 +19,7 @@ XrayUndistortion::XrayUndistortion(const CameraGeometry& camera)
 }
 
 XrayUndistortion::Place XrayUndistortion::place_of(const Eigen::Vector2d& stored_px) const {
-  // Rounding of a place on the image's last row or column must not take it outside.
+  // Rounding must not move a place on the image's last row or column outside.
   constexpr double kRoundingPx = 1e-9;
   const Eigen::Vector2d last(width_ - 1.0, height_ - 1.0);
   const Eigen::Vector2d inside = stored_px.cwiseMax(0.0).cwiseMin(last);

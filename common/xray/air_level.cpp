@@ -14,13 +14,13 @@ namespace af {
 
 namespace {
 
-constexpr double kBinWidth = 0.02;  ///< of log intensity
+constexpr double kBinWidth = 0.02;  ///< in log intensity
 constexpr int kPeakHalfBins = 5;    ///< a peak reaches 10 % to both sides
 constexpr double kLeastPeakShare = 0.03;
-constexpr double kEdgeBandShare = 0.05;  ///< of the shorter side
-constexpr double kEdgeAirShare = 0.9;    ///< percentile of the band
+constexpr double kEdgeBandShare = 0.05;  ///< share of the shorter side
+constexpr double kEdgeAirShare = 0.9;    ///< percentile within the band
 
-/// What stands for a pixel that counted nothing: half a step of the values.
+/// Half a step of the values. It stands for a pixel that counted nothing.
 double half_step(const std::vector<float>& values, double air_level) {
   float smallest_positive = 0.0f;
   bool integers = true;
@@ -29,7 +29,7 @@ double half_step(const std::vector<float>& values, double air_level) {
     if (value > 0.0f && (smallest_positive == 0.0f || value < smallest_positive))
       smallest_positive = value;
   }
-  // Of corrected values the smallest positive one may be next to nothing; half a count of 16 bits
+  // In corrected values the smallest positive one may be next to nothing. Half a count of 16 bits
   // is the least that a detector tells apart.
   constexpr double kHalfCount = 1.0 / 131072.0;
   return integers ? 0.5
@@ -68,7 +68,7 @@ std::optional<AirLevel> open_beam_peak(const std::vector<float>& intensities) {
   const double least = kLeastPeakShare * static_cast<double>(intensities.size());
   for (int bin = 0; bin < kBins; ++bin) {
     if (mass(bin) < least) continue;
-    // Up to the top of this peak.
+    // Climb to the top of this peak.
     while (bin + 1 < kBins && mass(bin + 1) > mass(bin)) ++bin;
     std::vector<float> peak;
     const double middle = top * std::exp(-kBinWidth * (bin + 0.5));
@@ -119,7 +119,7 @@ Background background_of(const Image2d& image, const Image2d& mask) {
 
 double bright_detail(const Image2d& image, const Image2d& mask) {
   struct Pixel {
-    float level;  // of the surroundings: the pixel's own noise must not choose its quarter
+    float level;  // level of the surroundings: the pixel's own noise must not choose its quarter
     float detail;
   };
   if (image.width < 3 || image.height < 3) return 0.0;
@@ -144,7 +144,7 @@ double bright_detail(const Image2d& image, const Image2d& mask) {
       sum += static_cast<double>(pixel->detail);
     return sum / static_cast<double>(quarter);
   };
-  // Ties by detail: which of equal pixels come first must not depend on the library.
+  // Detail settles ties: which of several equal pixels comes first must not depend on the library.
   const double dark = mean_detail([](const Pixel& a, const Pixel& b) {
     return a.level < b.level || (a.level == b.level && a.detail < b.detail);
   });

@@ -7,8 +7,8 @@
 
 namespace af {
 
-/// An image whose pixel (i, j) is the value of `image` at column `columns[i]`, row `rows[j]`:
-/// bilinear between pixel centres; beyond the outermost ones the nearest counts.
+/// An image whose pixel (i, j) is the value of `image` at column `columns[i]`, row `rows[j]`. It is
+/// bilinear between pixel centres. Beyond the outermost ones, the nearest counts.
 Image2d resampled_bilinearly(const Image2d& image,
                              std::span<const double> columns,
                              std::span<const double> rows);

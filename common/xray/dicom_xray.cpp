@@ -41,11 +41,11 @@ std::optional<int> sign_of(const DicomElements& header) {
   return static_cast<int>(*sign);
 }
 
-/// Of stored values to others (PS3.3, C.11.1); outside of its range its ends hold.
+/// Maps stored values to others (PS3.3, C.11.1). Outside of its range its end values hold.
 struct ModalityLut {
   double first = 0.0;  ///< the stored value of the first entry
   std::vector<double> entries;
-  double highest = 0.0;  ///< that its bits can hold
+  double highest = 0.0;  ///< highest value that its bits can hold
   std::string kind;
 
   [[nodiscard]] double operator()(double stored) const {
@@ -66,7 +66,7 @@ ModalityLut modality_lut_of(const DicomPixelLayout& layout) {
   ModalityLut lut;
   lut.kind = item.text({0x0028, 0x3004});
   lut.highest = std::exp2(descriptor[2]) - 1.0;
-  // Counts have no sign, whatever form the file gives them; first values have that of the pixels.
+  // Counts have no sign, however the file stores them. First values have that of the pixels.
   const auto wrapped = [&](double value) { return value < 0.0 ? value + kMostEntries : value; };
   const double count = descriptor[0] == 0.0 ? kMostEntries : wrapped(descriptor[0]);
   lut.first = layout.is_signed && descriptor[1] >= kMostEntries / 2.0 ? descriptor[1] - kMostEntries
@@ -83,7 +83,7 @@ ModalityLut modality_lut_of(const DicomPixelLayout& layout) {
   return lut;
 }
 
-/// The LUT's part in what the file says of its values.
+/// Adds what the LUT changes to what the file says of its values.
 void apply_modality_lut(const DicomPixelLayout& layout, DicomXray& xray) {
   const ModalityLut lut = modality_lut_of(layout);
   for (float& value : xray.image.pixels)

@@ -20,39 +20,41 @@ enum class PixelIntensity { NotStated, Linear, Logarithmic, Display, Other };
 struct DicomXray {
   DicomElements header;
   Image2d image;  ///< rescaled; neither inverted nor windowed; row 0 on top
-  Image2d data;   ///< 0 where a pixel is padding (PixelPaddingValue), 1 elsewhere; empty: none is
+  Image2d
+      data;  ///< 0 where a pixel is padding (PixelPaddingValue), 1 elsewhere; empty without padding
   std::string padding;   ///< what padding is, for messages
   std::string modality;  ///< empty when the file does not state it
   int frame = 1;
   int frames = 1;
   int stored_bits = 16;
   bool is_monochrome1 = false;  ///< shown with low values white
-  bool is_rescaled = false;     ///< by a slope and intercept other than 1 and 0
+  bool is_rescaled = false;     ///< by a slope other than 1 or an intercept other than 0
   PixelIntensity relationship = PixelIntensity::NotStated;
   std::string relationship_text;  ///< as the file has it
   /// PixelIntensityRelationshipSign: 1 = higher values mean more intensity, -1 = less.
   std::optional<int> sign;
   std::string window;  ///< "centre/width" as the file has it; empty: none
-  /// "kind, N entries" of the Modality LUT that was applied, in place of slope and intercept.
+  /// "kind, N entries" of the Modality LUT that replaced slope and intercept.
   std::string modality_lut;
-  /// The LUT of an XA or RF image turned logarithms into values linear to intensity (PS3.3,
-  /// C.8.7.1.1.2); `relationship` is then Linear.
+  /// The LUT of an XA or RF image turned logarithms into values linear in intensity (PS3.3,
+  /// C.8.7.1.1.2). `relationship` is then Linear.
   bool was_linearised = false;
-  /// The frame's own words on it (Pixel Intensity Relationship LUT), when it has functional groups.
+  /// What the frame says of it (Pixel Intensity Relationship LUT), when it has functional groups.
   std::string intensity_function;
-  /// Sum of the lowest and highest value that a pixel can hold: what a value is subtracted from to
-  /// turn white into black.
+  /// Sum of the lowest and highest value that a pixel can hold. Subtracting a value from it turns
+  /// white into black.
   double inversion_sum = 0.0;
 };
 
-/// Reads frame `frame` (from 1) of a DICOM image file; without it there must be one frame only.
-/// Errors as read_image(); InputError also for a PixelIntensityRelationshipSign that is not 1 or
-/// -1, a Modality LUT that is broken or stands beside a rescale, and a picture that is nothing but
-/// padding. Pixel spacings are left to imager_spacing_mm() and xray_pixel_spacing_mm().
+/// Reads frame `frame` (from 1) of a DICOM image file. Without `frame` there must be only one.
+/// Errors are those of read_image(). Throws InputError also for a PixelIntensityRelationshipSign
+/// that is not 1 or -1, for a Modality LUT that is broken or stands beside a rescale, and for a
+/// picture that is nothing but padding. Pixel spacings are left to imager_spacing_mm() and
+/// xray_pixel_spacing_mm().
 DicomXray read_dicom_xray(const std::filesystem::path& path, std::optional<int> frame);
 
-/// Column, row; PixelSpacing, which may be that of a plane in the patient. InputError when it is
-/// not two positive numbers.
+/// Column, row of PixelSpacing, which may describe a plane in the patient. Throws InputError when
+/// it is not two positive numbers.
 std::optional<Eigen::Vector2d> xray_pixel_spacing_mm(const DicomXray& xray);
 
 }  // namespace af

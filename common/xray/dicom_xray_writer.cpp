@@ -34,7 +34,7 @@ void add(gdcm::DataSet& data, const gdcm::Tag& tag, gdcm::VR::VRType form, std::
   data.Insert(element);
 }
 
-/// A decimal string has at most 16 characters.
+/// Text of at most 16 characters, the limit of a decimal string.
 std::string decimal(double value) {
   constexpr int kDigits = 9;
   std::array<char, 32> text{};
@@ -44,7 +44,7 @@ std::string decimal(double value) {
   return {text.data(), end};
 }
 
-/// Below 2.25, the root of UIDs that are made of a UUID.
+/// A UID below 2.25, the root of UIDs made from a UUID.
 std::string uid_of(const std::string& content) {
   const std::string hash = sha256_hex(std::as_bytes(std::span(content)));
   std::uint64_t value = 0;

@@ -32,9 +32,9 @@ Image2d gaussian_blur(const Image2d& image, double sigma_px) {
   const std::vector<double> kernel = gaussian_kernel(sigma_px);
   const int radius = static_cast<int>(kernel.size() / 2);
   const auto width = static_cast<std::size_t>(image.width);
-  const auto row_of = [&](auto& of, int row) {
+  const auto row_of = [&](auto& rows, int row) {
     const auto known = static_cast<std::size_t>(std::clamp(row, 0, image.height - 1));
-    return of.pixels.begin() + static_cast<std::ptrdiff_t>(known * width);
+    return rows.pixels.begin() + static_cast<std::ptrdiff_t>(known * width);
   };
   Image2d along_rows(image.width, image.height);
   Image2d blurred(image.width, image.height);

@@ -5,8 +5,8 @@
 
 namespace af {
 
-/// Gaussian smoothing with standard deviation `sigma_px`, kernel cut at 4 sigma and normalised to
-/// sum 1, edges replicated. sigma_px <= 0 returns the image unchanged.
+/// Gaussian smoothing with standard deviation `sigma_px`. The kernel is cut at 4 sigma and
+/// normalised to sum 1; edges are replicated. sigma_px <= 0 returns the image unchanged.
 Image2d gaussian_blur(const Image2d& image, double sigma_px);
 
 /// How many pixels away a value still counts; 0 for sigma_px <= 0.

@@ -11,7 +11,7 @@ std::vector<std::string> problems(const RegionOfInterest& roi, int columns, int 
                             ", " + std::to_string(roi.width) + ", " + std::to_string(roi.height) +
                             "]";
   const bool sane = roi.column >= 0 && roi.row >= 0 && roi.width > 0 && roi.height > 0;
-  // Written as differences so that hostile sizes cannot overflow.
+  // Differences cannot overflow for hostile sizes, while sums could.
   if (!sane || roi.width > columns - roi.column || roi.height > rows - roi.row)
     found.push_back("roi_px = " + value + ": must lie on the detector of " +
                     std::to_string(columns) + " x " + std::to_string(rows) + " pixels");

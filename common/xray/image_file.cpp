@@ -23,7 +23,7 @@ constexpr std::size_t kMaxPixels = std::size_t{1} << 28;  ///< 1 GB as float
 /// Deflate and LZW cannot expand a byte to more than this many.
 constexpr std::size_t kMaxExpansion = 4096;
 
-/// Grey images that fit into memory, on the first two axes.
+/// Accepts grey images that fit into memory, on the first two axes.
 void check_is_of_images(const RawImage& image, const fs::path& path) {
   if (image.channels != 1)
     throw InputError(
@@ -39,7 +39,7 @@ void check_is_2d(const RawImage& image, const fs::path& path) {
   if (const std::size_t used = image.used_axes(2); used != 2)
     throw InputError("dimensions", std::to_string(used), "must be a 2-D image", path.string());
   check_is_of_images(image, path);
-  // Of other formats the bytes are counted before memory is taken.
+  // For other formats, the bytes are counted before memory is taken.
   const bool is_picture = image.directions.empty();
   const std::size_t bytes = image.voxel_count() * value_bytes(image.type);
   if (std::error_code error; is_picture && bytes / kMaxExpansion > fs::file_size(path, error))
@@ -269,7 +269,7 @@ void write_png_image(const Image2d& image, const fs::path& path, double low, dou
   raw.values.reserve(image.pixels.size());
   for (const float pixel : image.pixels) {
     const double share = (static_cast<double>(pixel) - low) / (high - low);
-    // NaN becomes black.
+    // NaN fails the comparison and becomes black.
     const double level = share >= 0.0 ? std::min(share, 1.0) * 255.0 : 0.0;
     raw.values.push_back(static_cast<std::byte>(std::nearbyint(level)));
   }

@@ -15,34 +15,35 @@
 
 namespace af {
 
-/// Reads a 2-D image of any ITK format (mha, nii.gz, nrrd, tif, png 8/16-bit, single-slice DICOM)
-/// as float, row 0 on top, values as stored (a DICOM file's own rescale is applied; a TIFF file
-/// whose zero is white is turned round). FileError when it cannot be parsed or is truncated;
-/// InputError when it is not 2-D, has several channels or pixels that are not finite.
+/// Reads a 2-D image of any supported format (mha, nii.gz, nrrd, tif, png 8/16-bit, single-slice
+/// DICOM) as float, row 0 on top. Values are as stored, except that a DICOM file's own rescale is
+/// applied and a TIFF file whose zero is white is inverted. Throws FileError when it cannot be
+/// parsed or is truncated, InputError when it is not 2-D, has several channels or has pixels that
+/// are not finite.
 Image2d read_image(const std::filesystem::path& path);
 
-/// InputError that names the first pixel that is not finite, and `path`.
+/// Throws InputError that names the first pixel that is not finite, and `path`.
 void check_is_finite(const Image2d& image, const std::filesystem::path& path);
 
 /// An image with what its file says of its pixels.
 struct ImageWithSpacing {
   Image2d image;
-  /// Column, row; none for PNG, TIFF and DICOM, and for files that do not state it.
+  /// Column, row. None for PNG, TIFF and DICOM, and for files that do not state it.
   std::optional<Eigen::Vector2d> spacing_mm;
-  std::string note;  ///< what was done to the stored values; mostly nothing
+  std::string note;  ///< what was done to the stored values; usually empty
 };
 
-/// read_image() with the pixel spacing.
+/// read_image(), and the pixel spacing.
 ImageWithSpacing read_image_with_spacing(const std::filesystem::path& path);
 
 /// Reads a 3-D MetaImage, NRRD or NIfTI file as images of its first two axes, one after the other
-/// along the third, values as stored; holds one image at a time. Errors as read_image().
+/// along the third, with values as stored. Holds one image at a time. Errors are those of
+/// read_image().
 void for_each_image_of_stack(const std::filesystem::path& path,
                              const std::function<void(int number, Image2d&& image)>& visit);
 
-/// Writes float pixels unscaled: .mha .nii.gz .nrrd .tif, atomically. Pixel spacing (mm) is written
-/// where the format has it.
-/// `.png` is refused here with a pointer to write_png_image().
+/// Writes float pixels unscaled and atomically: .mha .nii.gz .nrrd .tif. Pixel spacing (mm) is
+/// written where the format has it. `.png` is refused with a pointer to write_png_image().
 void write_image(const Image2d& image,
                  const std::filesystem::path& path,
                  double column_spacing_mm,
@@ -56,24 +57,25 @@ struct ImagePlane {
   Eigen::Vector2d spacing_mm = Eigen::Vector2d::Ones();         ///< column, row
 };
 
-/// An image as a 3-D one of a single slice, 1 mm thick, where it lies in space; .mha .nii.gz .nrrd.
+/// Writes an image as a 3-D one of a single slice, 1 mm thick, where it lies in space: .mha .nii.gz
+/// .nrrd.
 void write_image_in_space(const Image2d& image,
                           const std::filesystem::path& path,
                           const ImagePlane& plane);
 
-/// Several images of one size as one 3-D stack; same formats.
+/// Writes several images of one size as one 3-D stack, in the same formats.
 void write_image_stack(const std::vector<Image2d>& images,
                        const std::filesystem::path& path,
                        double column_spacing_mm,
                        double row_spacing_mm);
 
-/// 16-bit unsigned MetaImage or PNG, for 12-bit X-rays.
+/// Writes 16-bit unsigned MetaImage or PNG, for 12-bit X-rays.
 void write_image_u16(const Image2d& image,
                      const std::filesystem::path& path,
                      double column_spacing_mm,
                      double row_spacing_mm);
 
-/// 8-bit grey PNG, `low` black, `high` white, row 0 on top.
+/// Writes 8-bit grey PNG: `low` is black, `high` white, row 0 on top.
 void write_png_image(const Image2d& image,
                      const std::filesystem::path& path,
                      double low,

@@ -15,9 +15,9 @@ struct Psnr {
   double foreground_fraction = 0.0;  ///< share of pixels whose reference value is not 0
 };
 
-/// Eq. (12): 20 log10(I_max / RMS difference), I_max the reference's maximum; pixels whose
-/// reference is exactly 0 (their ray meets no attenuating matter) are left out. nullopt when no
-/// pixel is foreground.
+/// Eq. (12): 20 log10(I_max / RMS difference), where I_max is the reference's maximum. Pixels whose
+/// reference is exactly 0 are left out, because their ray meets no attenuating matter. nullopt when
+/// no pixel is foreground.
 std::optional<Psnr> psnr(std::span<const float> drr, std::span<const float> reference);
 
 }  // namespace af

@@ -20,11 +20,11 @@ float nth(std::vector<float> values, std::size_t n) {
   return *at;
 }
 
-/// Two of the values; the nth is almost certainly one of those from the first to the second.
+/// Two of the values. The nth value almost certainly lies between them.
 std::pair<float, float> bracket(std::span<const float> values, std::size_t n) {
   constexpr std::size_t kSamples = 1024;
   std::array<float, kSamples> sample{};
-  // Far apart, and in no step with the rows of a picture.
+  // This stride spreads samples widely, and not in step with the rows of a picture.
   constexpr std::uint64_t kStride = 0x9E3779B1;
   for (std::size_t i = 0; i < kSamples; ++i) sample[i] = values[i * kStride % values.size()];
   std::sort(sample.begin(), sample.end());
@@ -45,7 +45,7 @@ float nearest_rank(std::span<const float> values, double share) {
   const std::size_t n = static_cast<std::size_t>(
                             std::max(1.0, std::ceil(share * static_cast<double>(values.size())))) -
                         1;
-  // Partitioning a whole picture takes ten times as long as a pass that picks out a few percent.
+  // Partitioning a whole picture takes ten times as long as one pass that picks out a few percent.
   const auto [low, high] = bracket(values, n);
   std::size_t below = 0;
   std::vector<float> between;

@@ -15,20 +15,23 @@ namespace af {
 
 namespace {
 
-constexpr double kMostMasked = 0.75;       ///< of the picture
-constexpr double kLeastMasked = 0.001;     ///< less is noise at the edge
-constexpr double kMostBorderShare = 0.5;   ///< of the bright level, with the detector's offset
-constexpr double kDarkShare = 0.15;        ///< of the way from the border's level to the bright one
-constexpr double kAsDarkShare = 0.12;      ///< of the same way: as dark as the border
-constexpr double kLeastRiseShare = 0.2;    ///< of the same way: least level inside a field's edge
-constexpr double kLeastFieldPart = 0.005;  ///< of the picture: smaller bright parts are specks
-constexpr double kMostOpaquePart = 0.02;   ///< of the picture, one body
-constexpr double kPenumbraShare = 0.06;    ///< of the shorter side: the widest penumbra
-constexpr double kRisen = 0.9;             ///< of the level inside: where the penumbra ends
-constexpr double kStraightShare = 0.15;    ///< of the shorter side
-constexpr double kMostStraight = 0.5;      ///< of a circle's edge, where anatomy crosses it
-constexpr double kCircleRmsShare = 0.02;   ///< of the radius
-constexpr double kMostMore = 0.1;          ///< that a circle may mask beyond the hull
+constexpr double kMostMasked = 0.75;    ///< of the picture
+constexpr double kLeastMasked = 0.001;  ///< less is noise at the edge
+constexpr double kMostBorderShare =
+    0.5;                             ///< share of the bright level, including the detector's offset
+constexpr double kDarkShare = 0.15;  ///< share of the way from the border's level to the bright one
+constexpr double kAsDarkShare = 0.12;  ///< share of the same way: as dark as the border
+constexpr double kLeastRiseShare =
+    0.2;  ///< share of the same way: least level inside a field's edge
+constexpr double kLeastFieldPart =
+    0.005;                                ///< share of the picture: smaller bright parts are specks
+constexpr double kMostOpaquePart = 0.02;  ///< share of the picture, for one body
+constexpr double kPenumbraShare = 0.06;   ///< share of the shorter side: the widest penumbra
+constexpr double kRisen = 0.9;            ///< share of the level inside: where the penumbra ends
+constexpr double kStraightShare = 0.15;   ///< share of the shorter side
+constexpr double kMostStraight = 0.5;     ///< share of a circle's edge, where anatomy crosses it
+constexpr double kCircleRmsShare = 0.02;  ///< share of the radius
+constexpr double kMostMore = 0.1;         ///< share that a circle may mask beyond the hull
 constexpr double kNoiseSigmaPx = 1.5;
 
 struct Rect {
@@ -49,7 +52,7 @@ bool is_constant_column(const Image2d& image, int column, int top, int bottom) {
   return true;
 }
 
-/// The picture without its constant rows and columns; at most a quarter of a side goes on each.
+/// The picture without its constant rows and columns. At most a quarter of a side is cut from each.
 Rect live_rect(const Image2d& image) {
   Rect live = {0, 0, image.width - 1, image.height - 1};
   const int most_columns = image.width / 4;
@@ -71,7 +74,7 @@ Image2d part_of(const Image2d& image, const Rect& rect) {
 }
 
 struct Levels {
-  double border = 0.0;  ///< darkest place of the outermost pixels
+  double border = 0.0;  ///< level of the darkest place of the outermost pixels
   double dark = 0.0;    ///< below this a pixel may be border
   double bright = 0.0;
   bool is_border_dark = false;  ///< much darker than air, as dark as the picture's darkest parts
@@ -93,7 +96,7 @@ Levels levels_of(const Image2d& smooth) {
   return levels;
 }
 
-/// Connected parts (4 neighbours) of the pixels that `is_in` lets in, each as a list of pixels.
+/// Connected parts (4 neighbours) of the pixels that `is_in` accepts, each as a list of pixels.
 template <typename IsIn>
 std::vector<std::vector<int>> parts_of(int width, int height, const IsIn& is_in) {
   std::vector<std::vector<int>> parts;
@@ -131,7 +134,7 @@ double cross(const Point& o, const Point& a, const Point& b) {
   return (a.x - o.x) * (b.y - o.y) - (a.y - o.y) * (b.x - o.x);
 }
 
-/// Andrew's monotone chain; without points on straight lines.
+/// Andrew's monotone chain. Points on straight lines are left out.
 std::vector<Point> convex_hull(std::vector<Point> points) {
   std::sort(points.begin(), points.end(), [](const Point& a, const Point& b) {
     return a.x < b.x || (a.x == b.x && a.y < b.y);
@@ -185,7 +188,8 @@ struct Interval {
   int last = -1;
 };
 
-/// The field's columns of a row, `margin_px` inside its sides (the picture's own edges excepted).
+/// The field's columns in a row, `margin_px` inside its sides (except along the picture's own
+/// edges).
 Interval row_of_field(const std::vector<Side>& sides, int row, int width, double margin_px) {
   constexpr double kRounding = 1e-6;
   double low = 0.0;
@@ -230,8 +234,8 @@ std::vector<double> ring_medians(const Image2d& smooth,
   return medians;
 }
 
-/// Along the field's edge values rise from the border's level to the field's: how many pixels that
-/// takes.
+/// How many pixels values take to rise from the border's level to the field's, along the field's
+/// edge.
 int penumbra_px(const std::vector<double>& medians, double border_level) {
   const double inside = *std::max_element(medians.begin(), medians.end());
   const double risen = border_level + kRisen * (inside - border_level);
@@ -240,10 +244,10 @@ int penumbra_px(const std::vector<double>& medians, double border_level) {
   return static_cast<int>(end - medians.begin());
 }
 
-/// Whether the sides part a border from a field: most of the edge is bright on its inner side, and
-/// what lies a third to two thirds of the widest penumbra beyond it is as dark as a border. Of dark
-/// anatomy at the edge of the picture the hull of the rest cuts through what is as dark on both
-/// sides, or fades slowly.
+/// Whether the sides separate a border from a field. Most of the edge must be bright on its inner
+/// side, and what lies a third to two thirds of the widest penumbra beyond it must be as dark as a
+/// border. For dark anatomy at the edge of the picture, the hull of the rest instead cuts through
+/// what is equally dark on both sides, or fades slowly.
 bool parts_dark_from_bright(const Image2d& smooth,
                             const std::vector<Side>& sides,
                             const std::vector<double>& rings,
@@ -303,8 +307,8 @@ std::optional<XrayBorders::Circle> fitted_circle(const std::vector<Point>& point
   return circle;
 }
 
-/// Tangents of the circle, close enough to be it. Where dark anatomy crosses the edge, the hull
-/// cuts a corner off, and the circle does not.
+/// Tangents so dense that they stand for the circle. Where dark anatomy crosses the edge, the hull
+/// cuts a corner off and the circle does not.
 std::vector<Side> sides_of_circle(const XrayBorders::Circle& circle) {
   constexpr int kSides = 180;
   std::vector<Side> sides;
@@ -328,7 +332,7 @@ double pixels_beyond(const std::vector<Side>& sides, const Image2d& live) {
   return beyond;
 }
 
-/// Clears the field beyond `margin_px` inside its sides; how many pixels that were.
+/// Clears the field beyond `margin_px` inside its sides. Returns how many pixels that were.
 double clear_beyond(const std::vector<Side>& sides, int margin_px, Image2d& field) {
   double cleared = 0.0;
   for (int row = 0; row < field.height; ++row) {
@@ -342,7 +346,7 @@ double clear_beyond(const std::vector<Side>& sides, int margin_px, Image2d& fiel
   return cleared;
 }
 
-/// What is dark and reaches the edge, part by part.
+/// The dark parts that reach the edge.
 std::vector<std::vector<int>> dark_parts_at_edge(const Image2d& smooth, double dark) {
   const auto is_at_edge = [&](int at) {
     const int column = at % smooth.width;
@@ -358,7 +362,7 @@ std::vector<std::vector<int>> dark_parts_at_edge(const Image2d& smooth, double d
   return parts;
 }
 
-/// First and last column of the field's bright parts in every row; specks are left out.
+/// First and last column of the field's bright parts in every row. Specks are left out.
 std::vector<Point> outline_of_field(const Image2d& smooth,
                                     const std::vector<std::uint8_t>& is_dark) {
   const auto parts = parts_of(smooth.width, smooth.height, [&](int at) {
@@ -384,7 +388,7 @@ std::vector<Point> outline_of_field(const Image2d& smooth,
   return points;
 }
 
-/// Clears small bodies at the edge, with `margin_px` about them, that are as dark as the border.
+/// Clears small bodies at the edge that are as dark as the border, with `margin_px` around them.
 double clear_opaque_parts(const Image2d& smooth,
                           const std::vector<std::vector<int>>& dark_parts,
                           double as_dark,
@@ -416,7 +420,7 @@ double clear_opaque_parts(const Image2d& smooth,
   return static_cast<double>(cleared);
 }
 
-/// The field within the live part of a picture; fills in what it found.
+/// The field within the live part of a picture. Writes what it found into `borders`.
 Image2d field_of(const Image2d& live, XrayBorders& borders) {
   constexpr int kOpaqueMarginPx = 3;
   Image2d field(live.width, live.height);
@@ -454,11 +458,11 @@ Image2d field_of(const Image2d& live, XrayBorders& borders) {
       edge.push_back(hull[i]);
       edge.push_back(hull[(i + 1) % hull.size()]);
     }
-    // A circle goes through the corners of any rectangle.
+    // This test comes first because a circle goes through the corners of any rectangle.
     if (straight_px < kMostStraight * length_px) borders.circle = fitted_circle(edge);
     if (borders.circle) {
       const std::vector<Side> tangents = sides_of_circle(*borders.circle);
-      // A short arc says nothing of where the rest of its circle runs.
+      // A short arc does not tell where the rest of its circle runs.
       if (pixels_beyond(tangents, live) <= (1.0 + kMostMore) * beyond)
         sides = tangents;
       else
@@ -561,7 +565,7 @@ std::vector<float> values_along_edge(const Image2d& intensity, const Image2d& ma
           values.push_back(intensity.pixels[at(column, row)]);
     return values;
   }
-  // Steps to the nearest masked pixel or the outside, along rows and along columns.
+  // Steps to the nearest masked pixel or to the outside, along rows and along columns.
   const int far = width_px + 1;
   std::vector<int> steps(intensity.pixels.size(), far);
   std::vector<int> down(static_cast<std::size_t>(width), 0);

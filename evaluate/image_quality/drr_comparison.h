@@ -12,11 +12,11 @@
 
 namespace af::evaluation {
 
-/// Poses with less foreground than this say nothing about a field, and are drawn again.
+/// Poses with less foreground than this say nothing about a field, so others are drawn instead.
 inline constexpr double kLeastForegroundFraction = 0.01;
 
 /// Random pose `attempt` of item `index`: uniform and independent in the six parameters over the
-/// motion box; depends on (seed, index, attempt) alone.
+/// motion box. It depends only on (seed, index, attempt).
 PoseParameters random_pose_in_range(const MotionRange& range,
                                     std::uint64_t seed,
                                     std::uint64_t index,
@@ -26,7 +26,7 @@ PoseParameters random_pose_in_range(const MotionRange& range,
 struct DrrComparison {
   PoseParameters parameters;
   int redrawn = 0;                ///< random poses discarded for too little foreground
-  std::int64_t rays_outside = 0;  ///< > 0: the field does not cover this pose; the rest is NaN
+  std::int64_t rays_outside = 0;  ///< > 0: the field does not cover this pose, and the rest is NaN
   double psnr_db = std::numeric_limits<double>::quiet_NaN();  ///< infinity: equal images
   double rms_difference = std::numeric_limits<double>::quiet_NaN();
   double mean_difference = std::numeric_limits<double>::quiet_NaN();     ///< DRR - reference
@@ -56,10 +56,11 @@ class DrrComparer {
  public:
   DrrComparer(const DrrRenderer& tested, const DrrRenderer& reference, const View& view);
 
-  /// At given parameters. A pose that the tested renderer does not cover is reported as such.
+  /// Compares at given parameters. A pose that the tested renderer does not cover is reported as
+  /// such.
   DrrComparison at_pose(const PoseFrame& frame, const PoseParameters& parameters);
-  /// At random pose `index`, drawn again while the reference has too little foreground. Throws
-  /// NumericError after 1000 draws, and when a pose of the motion box is not covered.
+  /// Compares at random pose `index`, drawn again while the reference has too little foreground.
+  /// Throws NumericError after 1000 draws, and when a pose of the motion box is not covered.
   DrrComparison at_random_pose(const PoseFrame& frame,
                                const MotionRange& range,
                                std::uint64_t seed,

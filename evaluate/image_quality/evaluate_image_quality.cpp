@@ -42,12 +42,12 @@ using nlohmann::json;
 
 /// One field to compare.
 struct Target {
-  std::string case_name;  ///< empty when the field stands alone
+  std::string case_name;  ///< empty when the field has no study
   std::filesystem::path field;
   std::filesystem::path ct;
   CtReadOptions ct_reading;
-  std::filesystem::path folder;          ///< of its results
-  std::optional<CameraGeometry> camera;  ///< none: the field's
+  std::filesystem::path folder;          ///< for its results
+  std::optional<CameraGeometry> camera;  ///< without it the field's
 };
 
 /// The output that all fields of a study share.
@@ -62,15 +62,15 @@ struct TargetResult {
   }
 };
 
-/// Everything a comparison needs, the same on every rank.
+/// Everything that a comparison needs, the same on every rank.
 struct Setup {
   std::shared_ptr<const OpenedField> field;
   std::shared_ptr<const OpenedField> bone;  ///< none for one energy
   NodeCt ct;
   std::vector<RigidTransform> poses;  ///< empty: random ones
   View view;
-  CameraDistance camera_distance;  ///< of the view's from the field's
-  MotionRange range;               ///< of random poses: the field's, or what it covers
+  CameraDistance camera_distance;  ///< between the view's camera and the field's
+  MotionRange range;  ///< of random poses: the field's, or what it covers for another camera
 
   [[nodiscard]] std::string look_up(const ImageQualityOptions& options) const {
     return options.look_up.empty() ? field->info().look_up : options.look_up;
@@ -86,7 +86,7 @@ struct Setup {
 };
 
 /// Sets the camera to look through and the range of random poses. An atlas holds its range at each
-/// of its angles; a field's range is that of its own camera.
+/// of its angles, while a field's range is that of its own camera.
 void choose_camera(const Target& target, Setup& setup) {
   const FieldIdentity& identity = setup.field->identity();
   setup.view = View::whole_detector(identity.camera);
@@ -270,7 +270,7 @@ void write_results(const ImageQualityOptions& options,
             << " poses\nresults: " << folder.string() << '\n';
 }
 
-/// Collective. The losses of the first poses, on rank 0.
+/// Collective. The losses at the first poses, on rank 0.
 std::vector<LossSplit> split_losses(const ImageQualityOptions& options,
                                     const Setup& setup,
                                     const DrrRenderer& field,
@@ -320,7 +320,7 @@ Renderers renderers_of(const ImageQualityOptions& options,
   return {beam.renderer(field, bone_field), beam.renderer(cast(setup.ct.volume), cast(bone))};
 }
 
-/// Collective. Compares one field and writes its folder; the result is rank 0's.
+/// Collective. Compares one field and writes its folder. Rank 0 has the result.
 TargetResult evaluate_target(const ImageQualityOptions& options,
                              const Target& target,
                              const std::string& command_line,
@@ -373,7 +373,7 @@ TargetResult evaluate_target(const ImageQualityOptions& options,
   return result;
 }
 
-/// The fields to compare: the one of --field, or those of the study's views.
+/// The fields to compare: that of --field, or those of the study's views.
 std::vector<Target> targets_of(const ImageQualityOptions& options) {
   const bool has_field = !options.field.empty() && !options.ct.empty();
   const bool has_any = !options.field.empty() || !options.ct.empty();
@@ -406,7 +406,7 @@ std::vector<Target> targets_of(const ImageQualityOptions& options) {
   return targets;
 }
 
-/// One table, box plot and sheet of pairs of all fields of a study.
+/// Writes one table, box plot and sheet of pairs for all fields of a study.
 void write_together(const std::vector<TargetResult>& results, const std::filesystem::path& folder) {
   std::vector<CsvCells> rows;
   std::vector<PicturePanel> panels;
@@ -452,7 +452,7 @@ void ImageQualityOptions::describe(Fields& field_list) {
       .choice(field_look_up_names());
   field_list("split_loss_poses",
              split_loss_poses,
-             "Split the loss at so many poses into interpolation and quantisation; some ten "
+             "Split the loss at this many poses into interpolation and quantisation; some ten "
              "ray-cast DRRs each")
       .at_least(0);
   field_list.part(ray_caster);

@@ -17,7 +17,7 @@ namespace {
 constexpr double kGoodPsnrDb = 40.0;  // the paper: almost all above
 constexpr double kPoorPsnrDb = 36.0;  // the paper: very few below
 
-/// Over the comparisons that were possible.
+/// PSNR of the comparisons that were possible.
 std::vector<double> psnr_values(const std::vector<DrrComparison>& comparisons) {
   std::vector<double> values;
   for (const DrrComparison& comparison : comparisons)

@@ -20,7 +20,7 @@ struct AxisTap {
   double weight = 0.0;
 };
 
-/// For a coordinate on the axis; beyond it, for the nearest end.
+/// The tap for a coordinate on the axis. Beyond the axis, the nearest end counts.
 AxisTap axis_tap(const GridAxis& axis, double position_mm) {
   const double coordinate =
       std::clamp(axis.node_coordinate(position_mm), 0.0, static_cast<double>(axis.nodes - 1));
@@ -137,9 +137,9 @@ class GridCaster {
   const LightSlab& light_slab_;
 };
 
-/// (s,t) nodes around every pixel.
+/// The (s,t) nodes around all pixels.
 struct NodeRectangle {
-  std::vector<std::pair<AxisTap, AxisTap>> taps;  ///< of the pixels
+  std::vector<std::pair<AxisTap, AxisTap>> taps;  ///< one pair per pixel
   int first_s = 0;
   int first_t = 0;
   int columns = 0;  ///< along s

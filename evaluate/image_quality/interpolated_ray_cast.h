@@ -9,13 +9,13 @@
 
 namespace af::evaluation {
 
-/// On which planes of a field rays are replaced by those through the nodes around them.
+/// The planes of a field on which rays are replaced by those through the nodes around them.
 enum class InterpolatedPlanes { Uv, St, Both };
 
 /// Ray casting with only the interpolation error of a field's look-up: it has the field's nodes,
-/// but neither its codebook nor its 16 bits. It interpolates as TwoPassAfDrr. With (u,v), a ray's
-/// value is blended from those of the four viewpoints around it, seen through its own (s,t) point;
-/// with (s,t), a pixel's value is bilinear in the image of the nodes, seen from the source. For
+/// but neither its codebook nor its 16 bits. It interpolates like TwoPassAfDrr. With (u,v), a ray's
+/// value is blended from those of the four viewpoints around it, seen through its own (s,t) point.
+/// With (s,t), a pixel's value is bilinear in the image of the nodes, seen from the source. For
 /// fields of one slab.
 /// \test InterpolatedRayCast.EqualsTheRaysThroughTheNodesAround
 class InterpolatedRayCast final : public DrrRenderer {
@@ -25,10 +25,10 @@ class InterpolatedRayCast final : public DrrRenderer {
                       const LightSlab& light_slab,
                       InterpolatedPlanes planes);
 
-  /// The same on other planes.
+  /// The same caster with interpolation on other planes.
   [[nodiscard]] InterpolatedRayCast on(InterpolatedPlanes planes) const;
 
-  /// Without gradients.
+  /// Does not give gradients.
   RenderStatus render(const RigidTransform& room_from_ct,
                       const View& view,
                       RenderWorkspace& workspace,

@@ -10,7 +10,7 @@
 namespace af::evaluation {
 namespace {
 
-/// Mean of (a - b)^2 over the reference's foreground, over its squared maximum.
+/// Mean of (a - b)^2 over the reference's foreground, divided by its squared maximum.
 double mean_square(const std::vector<float>& a,
                    const std::vector<float>& b,
                    const std::vector<float>& reference) {

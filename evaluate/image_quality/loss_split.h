@@ -9,10 +9,10 @@
 
 namespace af::evaluation {
 
-/// What a field's DRR loses at one pose, each against ray casting: by interpolation over (u,v)
-/// alone, over (s,t) alone, over both, by everything after interpolation (16 bits, codebook, caster
-/// of the field), and in all. Mean squared differences over the reference's foreground, in units of
-/// its squared maximum; psnr_db = -10 log10(these), as eq. (12).
+/// What a field's DRR loses at one pose, compared with ray casting: by interpolation over (u,v)
+/// alone, over (s,t) alone and over both, by everything after interpolation (16 bits, codebook,
+/// caster of the field), and in all. These are mean squared differences over the reference's
+/// foreground, in units of its squared maximum. psnr_db = -10 log10(these), as in eq. (12).
 struct LossSplit {
   static constexpr std::size_t kParts = 5;
   static constexpr std::array<const char*, kParts> kNames = {
@@ -28,8 +28,8 @@ struct LossSplit {
 /// \test LossSplitter.AFieldWithoutQuantisationLosesByInterpolationAlone
 class LossSplitter {
  public:
-  /// The two-pass linear look-up of a field of one slab, and the reference, which both outlive
-  /// this; and ray casting with the interpolation of that field.
+  /// Takes the two-pass linear look-up of a field of one slab, and the reference, which must both
+  /// outlive this, and ray casting with the interpolation of that field.
   LossSplitter(const DrrRenderer& field,
                const DrrRenderer& reference,
                const InterpolatedRayCast& interpolated,

@@ -9,8 +9,8 @@
 
 namespace af::evaluation {
 
-/// Writes loss-split-poses.csv and the figure loss-split, and returns the entry of summary.json:
-/// PSNR of every part, and its share of the total mean square.
+/// Writes loss-split-poses.csv and the figure loss-split. Returns the entry of summary.json: PSNR
+/// of every part, and its share of the total mean square.
 nlohmann::json write_loss_split(const std::vector<LossSplit>& splits,
                                 const std::filesystem::path& folder);
 

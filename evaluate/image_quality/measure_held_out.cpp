@@ -29,7 +29,7 @@ namespace {
 /// Standard deviation of the Gaussian by which images are smoothed for the second PSNR.
 constexpr double kSmoothingPx = 1.5;
 
-/// Ray casting, or a field.
+/// Ray casting or a field, which predicts X-rays.
 struct Predictor {
   std::string name;
   std::shared_ptr<const DrrRenderer> renderer;
@@ -46,10 +46,10 @@ struct HeldOutRow {
 
 struct HeldOutRows {
   std::vector<HeldOutRow> rows;
-  int views_outside = 0;  ///< of which a field lacks rays
+  int views_outside = 0;  ///< views whose rays some field lacks
 };
 
-/// PSNR over chosen pixels; NaN when the X-ray shows nothing there.
+/// PSNR over chosen pixels. NaN when the X-ray shows nothing there.
 double psnr_over(const Image2d& predicted,
                  const Image2d& measured,
                  const std::vector<std::size_t>& pixels) {
@@ -63,7 +63,7 @@ double psnr_over(const Image2d& predicted,
   return result ? result->psnr_db : std::nan("");
 }
 
-/// Pixels of the region that no mask hides and where the CT casts something.
+/// Pixels of the region that no mask hides and whose rays the CT attenuates.
 std::vector<std::size_t> judged_pixels(const ViewXray& xray,
                                        const RegionOfInterest& region,
                                        const Image2d& cast) {
@@ -79,7 +79,7 @@ std::vector<std::size_t> judged_pixels(const ViewXray& xray,
   return pixels;
 }
 
-/// The whole detector, with the region's pixels rendered and the others 0.
+/// The whole detector. The region's pixels are rendered, the others are 0.
 Image2d rendered_region(const DrrRenderer& renderer,
                         const RigidTransform& room_from_ct,
                         const View& view) {
@@ -114,7 +114,7 @@ void judge_view(const Study& study,
     for (const std::size_t pixel : pixels) part.pixels[pixel] = whole.pixels[pixel];
     return part;
   };
-  // Beyond the region no DRR is rendered: smoothing must not fetch the X-ray from there, either.
+  // No DRR is rendered beyond the region, so smoothing must not take the X-ray from there either.
   const Image2d measured = judged_part(xray.attenuation);
   const Image2d smooth_measured = gaussian_blur(measured, kSmoothingPx);
   for (std::size_t i = 0; i < predictors.size(); ++i) {
@@ -139,7 +139,7 @@ CsvTable rows_table(const std::vector<HeldOutRow>& rows) {
   });
 }
 
-/// Collective. Ray casting first, then the fields under their files' names.
+/// Collective. Ray casting first, then the fields under the names of their files.
 std::vector<Predictor> load_predictors(const HeldOutOptions& options, const Communicator& world) {
   const auto pool = std::make_shared<ThreadPool>(thread_count(options.threads));
   std::vector<Predictor> fields;

@@ -14,12 +14,12 @@ namespace af::evaluation {
 /// `af-evaluate held-out` as typed.
 struct HeldOutOptions {
   std::filesystem::path study;
-  std::vector<std::string> cases;  ///< empty: all
+  std::vector<std::string> cases;  ///< empty for all
   std::vector<std::filesystem::path> fields;
-  std::filesystem::path ct;  ///< that the fields are of
+  std::filesystem::path ct;  ///< from which the fields were made
   CtReadOptions ct_reading;
   RayCasterOptions ray_caster;
-  std::string look_up;  ///< empty: each field's own
+  std::string look_up;  ///< empty for each field's own
   int threads = 0;
   std::filesystem::path output = "held-out.md";
 
@@ -28,11 +28,12 @@ struct HeldOutOptions {
 
 std::vector<std::string> problems(const HeldOutOptions& options);
 
-/// Collective. How well fields and their CT's ray casting predict the X-rays of a study at their
-/// true poses: PSNR of eq. (12) with the X-ray as the reference, over the pixels of each view's
-/// region that no mask hides and whose rays the CT attenuates, as they are and with both images
-/// smoothed. A view is left out for all predictors if some field lacks a ray of its region. Writes
-/// a table (Markdown) and a row per view and renderer (CSV beside it). Rank 0 does the work.
+/// Collective. Measures how well fields, and ray casting of their CT, predict the X-rays of a study
+/// at their true poses. The measure is PSNR of eq. (12) with the X-ray as the reference, over the
+/// pixels of each view's region that no mask hides and whose rays the CT attenuates. It is taken of
+/// the images as they are and of both images smoothed. A view is left out for all predictors if
+/// some field lacks a ray of its region. Writes a table (Markdown), and a row per view and renderer
+/// (CSV beside it). Rank 0 does the work.
 cli::SubCommand held_out_command(CLI::App& app);
 
 }  // namespace af::evaluation

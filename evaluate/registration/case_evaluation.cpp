@@ -48,15 +48,15 @@ struct Method {
   std::string renderer;
   registration::Registration registration;
   std::vector<std::int64_t> start_indices;  ///< ascending
-  double success_tre_mm = kSuccessTreMm;    ///< failures keep their traces
+  double success_tre_mm = kSuccessTreMm;    ///< only failures keep their traces
 
   [[nodiscard]] const registration::RegistrationProblem& problem() const {
     return *registration.problem;
   }
 };
 
-/// Inside the motion range of every field in use; where a field has none for this camera, all rays
-/// must be inside.
+/// Whether a pose lies inside the motion range of every field in use. Where a field has no range
+/// for this camera, all rays must be inside.
 bool is_admissible(const std::vector<Method>& methods, const RigidTransform& room_from_ct) {
   for (const Method& method : methods)
     for (const registration::RegistrationView& view : method.problem().views)
@@ -67,7 +67,7 @@ bool is_admissible(const std::vector<Method>& methods, const RigidTransform& roo
   return true;
 }
 
-/// The motion range of the first field in use; the others may have another.
+/// The motion range of the first field in use. The others may have another one.
 std::optional<StartLimit> motion_limit(const std::vector<Method>& methods) {
   for (const Method& method : methods)
     for (const registration::RegistrationView& view : method.problem().views)
@@ -75,7 +75,7 @@ std::optional<StartLimit> motion_limit(const std::vector<Method>& methods) {
   return std::nullopt;
 }
 
-/// Rank 0: draws or reads a case's starts, with `notes` on what it read.
+/// Rank 0: draws or reads a case's starts. `notes` receives remarks on what it read.
 StratifiedStarts make_starts(const RegistrationStudyOptions& options,
                              const Study& study,
                              const StudyCase& study_case,
@@ -96,8 +96,8 @@ StratifiedStarts make_starts(const RegistrationStudyOptions& options,
   return options.start_rule == "uniform" ? uniform_starts(measures) : stratified_starts(measures);
 }
 
-/// Collective. Makes rank 0's starts known to every rank, held once per node: one copy per rank
-/// would fill a node with ten million starts.
+/// Collective. Gives rank 0's starts to every rank, held once per node: one copy per rank would
+/// fill a node with ten million starts.
 SharedArray<PerturbedStart> held_per_node(const SharedArray<PerturbedStart>& starts,
                                           const Communicator& world) {
   static_assert(std::is_trivially_destructible_v<PerturbedStart> &&
@@ -114,7 +114,8 @@ SharedArray<PerturbedStart> held_per_node(const SharedArray<PerturbedStart>& sta
   return {owner, {reinterpret_cast<const PerturbedStart*>(owner.get()), count}};
 }
 
-/// With both renderers, ray casting may be given fewer intervals and starts.
+/// Assigns starts to methods. With both renderers, ray casting may be given fewer intervals and
+/// starts.
 void assign_starts(const RegistrationStudyOptions& options,
                    const StratifiedStarts& starts,
                    Method& method) {
@@ -134,14 +135,15 @@ void assign_starts(const RegistrationStudyOptions& options,
       is_reduced ? options.raycast_starts_per_interval.value_or(options.starts_per_interval)
                  : options.starts_per_interval;
   if (!is_reduced) method.start_indices.reserve(starts.starts.size());
-  // For the other methods every start counts, also those of a file that lie beyond the intervals.
+  // For the other methods every start counts, including those of a file that lie beyond the
+  // intervals.
   for (std::size_t i = 0; i < starts.starts.size(); ++i)
     if (!is_reduced ||
         (starts.starts[i].interval < intervals && starts.starts[i].rank_in_interval < per_interval))
       method.start_indices.push_back(static_cast<std::int64_t>(i));
 }
 
-/// How the error of an end lies in its covariance; NaN without either.
+/// Squared Mahalanobis distance of an end's error by its covariance. NaN when either is missing.
 double squared_distance_of(const RegistrationRow& row) {
   if (!std::isfinite(row.uncertainty.covariance_deg_mm[0])) return RegistrationRow::kMissing;
   const PoseParameters error = PoseParameters::from_deg_and_mm(row.final_deg_mm);
@@ -151,7 +153,7 @@ double squared_distance_of(const RegistrationRow& row) {
       registration::from_deg_mm(row.uncertainty.covariance_deg_mm), error_rad_mm);
 }
 
-/// The row of one start, without its case; for a failure with its trace.
+/// The row of one start, without its case. A failure has its trace.
 TracedRow traced_row(Method& method,
                      const PerturbedStart& start,
                      std::int64_t index,
@@ -179,7 +181,7 @@ TracedRow traced_row(Method& method,
 /// What is kept of a method when its fields are released.
 struct MethodRows {
   std::string renderer;
-  std::vector<std::int64_t> start_indices;  ///< rank 0
+  std::vector<std::int64_t> start_indices;  ///< rank 0 only
   ResumableItems items;                     ///< one per start index
 
   /// Rank 0: calls `receive` with the row of every start.
@@ -190,8 +192,8 @@ struct MethodRows {
   }
 };
 
-/// Collective. Registers every start of one method that is not finished. Methods go one after the
-/// other: blocks of the work queue then hold work of one duration.
+/// Collective. Registers every start of one method that is not finished. Methods come one after the
+/// other, so that blocks of the work queue hold work of one duration.
 void register_with(Method& method,
                    const std::string& case_name,
                    const StratifiedStarts& starts,
@@ -212,7 +214,7 @@ void register_with(Method& method,
                  });
 }
 
-/// Rank 0: adds the rows of a method, by start index; returns its traces.
+/// Rank 0: adds the rows of a method, by start index, and returns its traces.
 FirstTraces add_rows(const MethodRows& method, std::vector<RegistrationRow>& rows) {
   FirstTraces traces;
   const std::vector<std::int64_t>& indices = method.start_indices;
@@ -226,20 +228,21 @@ FirstTraces add_rows(const MethodRows& method, std::vector<RegistrationRow>& row
   return traces;
 }
 
-/// Typical number of poses that a method tries: medians of preset paper, and of robust, whose steps
-/// come from normal equations.
+/// Typical number of poses that a method tries: the median of preset paper, and that of robust,
+/// whose steps come from normal equations.
 double usual_poses(const registration::RegistrationOptions& options) {
   return options.optimizer_list().find("newton") == std::string::npos ? 400.0 : 15.0;
 }
 
-/// Rank 0 says how long each method will take, from a sample: one row by fields; by ray casting,
-/// where that would be long, one similarity for each of the poses that the sample tried.
+/// Rank 0 says how long each method will take, from a sample. With fields the sample is one row.
+/// With ray casting, where that would be long, it is one similarity for each of the poses that the
+/// field's sample tried.
 void announce_times(std::vector<Method>& methods,
                     const std::string& case_name,
                     const StratifiedStarts& starts,
                     const Yardstick& yardstick,
                     const Communicator& world) {
-  std::optional<double> poses_tried;  // by the field's sample
+  std::optional<double> poses_tried;  // from the field's sample
   for (Method& method : methods) {
     if (method.start_indices.empty()) continue;
     const std::int64_t index = method.start_indices[method.start_indices.size() / 2];
@@ -327,7 +330,7 @@ std::vector<ChosenRow> chosen_rows(const MethodRows& method) {
   return chosen;
 }
 
-/// Overlays of chosen registrations, and what Slicer loads of each.
+/// Draws overlays of chosen registrations, and writes what Slicer loads of each.
 void draw_overlays(const Method& method,
                    const std::vector<ChosenRow>& chosen,
                    const StudyCase& study_case,
@@ -376,7 +379,7 @@ void draw_overlays(const Method& method,
   }
 }
 
-/// Collective. Finds out which items of each method are finished; does none yet.
+/// Collective. Finds out which items of each method are finished, and does none yet.
 std::vector<MethodRows> begin_registrations(const RegistrationStudyOptions& options,
                                             const CaseEvaluation& evaluation,
                                             const std::vector<Method>& methods,
@@ -394,7 +397,7 @@ std::vector<MethodRows> begin_registrations(const RegistrationStudyOptions& opti
   return begun;
 }
 
-/// Rank 0: the pictures of a case, by its first method.
+/// Rank 0: draws the pictures of a case, by its first method.
 void draw_pictures(const RegistrationStudyOptions& options,
                    const StudyCase& study_case,
                    const Method& method,
@@ -407,8 +410,8 @@ void draw_pictures(const RegistrationStudyOptions& options,
       method, chosen_rows(rows), study_case, yardstick, options.output_folder, evaluation);
 }
 
-/// Rank 0: the first method that holds all rays of a view, which is as good as the CT for a look at
-/// it; else rays cast through the CT, which is then read. `methods` must outlive it.
+/// Rank 0: the first method that holds all rays of a view, which is as good as the CT for looking
+/// at it. Otherwise rays are cast through the CT, which is then read. `methods` must outlive it.
 ViewRenderer setting_renderer(const std::vector<Method>& methods, const StudyCase& study_case) {
   return [&, cast = ViewRenderer()](const View& view, const RigidTransform& pose) mutable {
     for (const Method& method : methods)
@@ -421,15 +424,15 @@ ViewRenderer setting_renderer(const std::vector<Method>& methods, const StudyCas
   };
 }
 
-/// Rank 0: how cameras, X-rays and poses of a case fit together, which was the same before anything
-/// was registered.
+/// Rank 0: draws how cameras, X-rays and poses of a case fit together. That was the same before
+/// anything was registered.
 void draw_setting(const RegistrationStudyOptions& options,
                   const Study& study,
                   const StudyCase& study_case,
                   const std::vector<Method>& methods,
                   CaseEvaluation& evaluation) {
   const WorkNote note("drawing the setting of case " + study_case.name, WorkNote::Kind::Phase);
-  // A report holds the pictures of all cases.
+  // Kept small, because a report holds the pictures of all cases.
   constexpr int kMostPixels = 320;
   const StudyPictures pictures = draw_study_pictures(study,
                                                      study_case,
@@ -438,7 +441,7 @@ void draw_setting(const RegistrationStudyOptions& options,
                                                      kMostPixels,
                                                      options.output_folder,
                                                      file_name_part(study_case.name) + "-setting");
-  // One of each view, then the room.
+  // There is one for each view, then the room.
   for (std::size_t i = 0; i < pictures.files.size(); ++i)
     evaluation.pictures.push_back(
         {{"file", pictures.files[i].filename().string()},
@@ -572,7 +575,7 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
   all_or_none(world, [&] {
     for (Method& method : methods) assign_starts(options, evaluation.starts, method);
   });
-  // Refusals come first: they leave the results of an earlier run alone.
+  // Refusals come first, so that they leave the results of an earlier run alone.
   std::vector<MethodRows> rows;
   if (!options.is_starts_only) rows = begin_registrations(options, evaluation, methods, run, world);
   do_on_root(world, [&] { on_starts(evaluation); });
@@ -584,15 +587,15 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
   phase.reset();
   for (std::size_t i = 0; i < methods.size(); ++i)
     register_with(methods[i], study_case.name, evaluation.starts, yardstick, rows[i].items);
-  // The starts go before the rows come: memory has room for only one of the two.
+  // The starts are released before the rows come: memory has room for only one of the two.
   evaluation.starts.starts = {};
   do_on_root(world, [&] {
     if (options.pictures.are_left_out) return;
     draw_pictures(options, study_case, methods.front(), rows.front(), yardstick, evaluation);
     draw_setting(options, study, study_case, methods, evaluation);
   });
-  // Fields and CT go before the rows come: memory has room for only one of the two. Only fields
-  // that the next case uses, too, stay (KeptFields).
+  // Fields and CT are released before the rows come: memory has room for only one of the two. Only
+  // fields that the next case also uses stay (KeptFields).
   methods.clear();
   do_on_root(world, [&] {
     const WorkNote note("reading the rows of case " + study_case.name, WorkNote::Kind::Phase);

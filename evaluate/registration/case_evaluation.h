@@ -22,30 +22,30 @@
 
 namespace af::evaluation {
 
-/// The results of one case of a study. Rank 0 has all of them; the others have what their work
+/// The results of one case of a study. Rank 0 has all of them, and the others have what their work
 /// needs.
 struct CaseEvaluation {
   std::string case_name;
   GoldStandard gold;
-  /// Rank 0; the list of starts on every rank, until they are registered.
+  /// On rank 0; the list of starts is on every rank until they are registered.
   StratifiedStarts starts;
   std::size_t start_count = 0;
-  std::map<std::string, FirstTraces> traces;  ///< rank 0: of each renderer
+  std::map<std::string, FirstTraces> traces;  ///< rank 0: by renderer
   LoadedInputs inputs;
-  std::vector<std::string> pose_problems;             ///< of poses that were read, in words
+  std::vector<std::string> pose_problems;             ///< about poses that were read, in words
   nlohmann::json pictures = nlohmann::json::array();  ///< rank 0: files and what they show
 };
 
-/// What poses in files of one case are relative to.
+/// The frames of poses in files of one case.
 PoseTableFrames pose_table_frames(const RegistrationStudyOptions& options,
                                   const Study& study,
                                   const StudyCase& study_case,
                                   const RigidTransform& gold_room_from_ct);
 
-/// What the starts of a case are relative to.
+/// The frame of a case's starts.
 StartFrame start_frame(const StudyCase& study_case, const Yardstick& yardstick);
 
-/// The starts of --starts-from for one case. `notes` get what the reader of its file says.
+/// The starts of --starts-from for one case. `notes` receives what the reader of the file says.
 StratifiedStarts given_starts(const RegistrationStudyOptions& options,
                               const Study& study,
                               const StudyCase& study_case,
@@ -56,19 +56,19 @@ StratifiedStarts given_starts(const RegistrationStudyOptions& options,
 /// The start of a row.
 void set_start(const PerturbedStart& start, RegistrationRow& row);
 
-/// The row of one registration, without case and renderer. Never throws for `run`: an exception
-/// becomes stop reason "error" with its message; a result without similarity has no pose.
+/// The row of one registration, without case and renderer. An exception of `run` is never passed
+/// on: it becomes stop reason "error" with its message. A result without similarity has no pose.
 /// \test RegisteredRow.OfARegistrationThatThrowsIsAFailure
 RegistrationRow registered_row(
     const std::function<registration::RegistrationRecord(const RigidTransform& start)>& run,
     const PerturbedStart& start,
     const Yardstick& yardstick);
 
-/// Collective. Draws a case's starts, calls `on_starts` with the evaluation so far (on rank 0,
-/// before anything is registered), registers from every start with every renderer, the work shared
-/// over the ranks as these become free, and draws the X-rays and the overlays of the best, median
+/// Collective. Draws a case's starts, and calls `on_starts` with the evaluation so far (on rank 0,
+/// before anything is registered). Then registers from every start with every renderer, sharing the
+/// work over ranks as they become free, and draws the X-rays and the overlays of the best, median
 /// and worst result. A registration that throws becomes a row without a pose. With --starts-only
-/// nothing is registered and drawn. Rank 0 adds the rows, by renderer and start index, to `rows`.
+/// nothing is registered or drawn. Rank 0 adds the rows, by renderer and start index, to `rows`.
 CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
                              const Study& study,
                              const StudyCase& study_case,

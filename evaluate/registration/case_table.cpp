@@ -57,7 +57,7 @@ CsvTable drawn_starts_table(const json& cases, const json& renderers) {
         const json& values = of_case.at(key);
         return k < values.size() ? number_of(values.at(k)) : kNan;
       };
-      // Zeros of starts that were not drawn say nothing.
+      // Zeros for starts that were not drawn would say nothing.
       const bool is_drawn = !of_case.at("draws_per_interval").empty();
       rows.push_back(
           {{"case", of_case.at("case").get<std::string>()},

@@ -52,7 +52,7 @@ void run_compare(const CompareOptions& options,
     const std::vector<EvaluationRun> runs = find_runs(options.runs);
     const CsvTable methods = methods_table(runs);
     const CsvTable pairs = pairs_table(runs);
-    // Of an earlier comparison these would stand in the Markdown.
+    // Those of an earlier comparison would end up in the Markdown.
     for (const std::filesystem::path& path : {pairs_csv, distances_csv, patients_csv})
       remove_output(path);
     if (pairs.row_count() > 0) write_text_file(pairs_csv, pairs.to_text());

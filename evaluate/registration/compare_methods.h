@@ -13,7 +13,7 @@ namespace af::evaluation {
 struct CompareOptions {
   std::vector<std::filesystem::path> runs;
   std::filesystem::path output = "methods.md";
-  bool is_screen = false;  ///< Markdown of measures against optimisers
+  bool is_screen = false;  ///< Markdown shows measures against optimisers
 
   bool with_pose_distances = false;
   double equivalence_margin_mm = 0.1;
@@ -21,8 +21,8 @@ struct CompareOptions {
   void describe(Fields& field);
 };
 
-/// Collective. One table of all finished registration runs, as Markdown and, beside it, as CSV; one
-/// of pairs below it when runs have both renderers.
+/// Collective. Makes one table of all finished registration runs, as Markdown and, beside it, as
+/// CSV. When runs have both renderers, one of pairs follows below it.
 cli::SubCommand compare_command(CLI::App& app);
 
 }  // namespace af::evaluation

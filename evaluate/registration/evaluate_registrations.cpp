@@ -52,7 +52,7 @@ json simulation_in(const std::filesystem::path& folder) {
     json provenance = json_of_text(text, path.string());
     if (provenance.is_object() && provenance.value("program", json()) == "af-simulate")
       return provenance;
-  } catch (const FileError&) {  // another program's
+  } catch (const FileError&) {  // from another program
   }
   return nullptr;
 }
@@ -73,7 +73,7 @@ const std::set<std::string> not_of_repeats = {"--case",
                                               "--raycast-intervals",
                                               "--output"};
 
-/// From what af-report makes the command for one start; null for another program's poses.
+/// What af-report needs to make the command for one start. Null for another program's poses.
 json repeat_json(const RegistrationStudyOptions& options) {
   if (!options.poses_from.empty()) return nullptr;
   const std::filesystem::path folder =
@@ -88,7 +88,7 @@ json repeat_json(const RegistrationStudyOptions& options) {
 
 /// How the study's X-rays were simulated, if they were: the provenance that af-simulate leaves
 /// beside study.toml, or beside the X-rays when studies were joined. For a joined study it is the
-/// provenance of the first case, and the commands of all cases are listed.
+/// provenance of the first case, with the commands of all cases.
 json simulation_of(const Study& study) {
   if (json simulation = simulation_in(study.path.parent_path()); simulation.is_object())
     return simulation;
@@ -108,7 +108,7 @@ json point_json(const Eigen::Vector3d& point) {
   return {point.x(), point.y(), point.z()};
 }
 
-/// What the rows' parameters are relative to, and the box that distances are means over.
+/// Adds what the rows' parameters are relative to, and the box over which distances are averaged.
 void add_target(const CaseEvaluation& evaluation, const StudyCase& study_case, json& of_case) {
   of_case["gold_room_from_ct"] = pose_rows(evaluation.gold.room_from_ct);
   of_case["center_ct_mm"] = point_json(study_case.center_ct_mm);
@@ -135,7 +135,7 @@ json case_json(const CaseEvaluation& evaluation) {
       {"rotation_share_per_interval", numbers_json(evaluation.starts.rotation_share_per_interval)}};
 }
 
-/// Warnings about starts that are not of every kind: where the fields' range refused most draws.
+/// Warns of starts that do not cover all directions because the fields' range refused most draws.
 std::vector<std::string> warnings_about_starts(const RegistrationStudyOptions& options,
                                                const CaseEvaluation& evaluation) {
   const StratifiedStarts& starts = evaluation.starts;
@@ -173,7 +173,7 @@ EndDistance end_distance_of(const Study& study, const std::vector<CaseEvaluation
   };
 }
 
-/// The gold standard's own error, to stand beside every TRE: that of a case, and the mean over a
+/// The gold standard's own error, to be shown beside every TRE: that of a case, and the mean over a
 /// renderer's starts. null when a case's gold pose is a stated one.
 void add_gold_uncertainty(const std::vector<CaseEvaluation>& evaluations, json& renderers) {
   std::map<std::string, double> own_mm;
@@ -254,7 +254,7 @@ json summary_json(const RegistrationStudyOptions& options,
 
 void write_traces(const std::filesystem::path& folder,
                   const std::vector<CaseEvaluation>& evaluations) {
-  // Traces of an earlier run would be taken for those of this run.
+  // Traces of an earlier run would be taken for this run's.
   std::filesystem::remove_all(folder / "traces");
   for (const CaseEvaluation& evaluation : evaluations)
     for (const auto& [renderer, traces] : evaluation.traces)
@@ -265,8 +265,8 @@ void write_traces(const std::filesystem::path& folder,
       }
 }
 
-/// The mean error of successes beside the gold standard's own, and how deep one view's lie from the
-/// truth; empty without a success.
+/// The mean error of successes beside the gold standard's own, and how far successes of one view
+/// lie from the truth in depth. Empty without a success.
 std::string mean_text(const json& renderer) {
   const double mean_mm = number_of(renderer["error_of_successes_mm"]["mean"]);
   const double gold_mm = number_of(renderer["gold_uncertainty_mm"]);
@@ -398,11 +398,11 @@ void describe_methods(Fields& field, RegistrationStudyOptions& options) {
       });
   field("raycast_starts_per_interval",
         options.raycast_starts_per_interval,
-        "With --renderer both: so many of each interval's starts also by ray casting (default: "
+        "With --renderer both: this many of each interval's starts also by ray casting (default: "
         "all)");
   field("raycast_intervals",
         options.raycast_intervals,
-        "With --renderer both: ray casting only in the first so many intervals (default: all)");
+        "With --renderer both: ray casting only in this many first intervals (default: all)");
   field("equivalence_margin_mm",
         options.equivalence_margin_mm,
         "Field and ray casting are equivalent when their ends are this near on average over "

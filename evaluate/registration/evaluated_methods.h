@@ -14,15 +14,15 @@
 
 namespace af::evaluation {
 
-/// Which methods are compared with a case's X-rays, and how: options of every subcommand that
-/// registers or measures similarity.
+/// Which methods are compared with a case's X-rays, and how. These options belong to every
+/// subcommand that registers or measures similarity.
 struct MethodOptions {
   std::filesystem::path study;
   registration::FieldPaths fields;
   std::string renderer = "field";  ///< "field", "raycast" or "both"
   std::string gold = "auto";
   registration::MethodOptions method;
-  AttenuationModel attenuation;  ///< of ray casting
+  AttenuationModel attenuation;  ///< for ray casting
   RayCasterOptions ray_caster;
   XrayBeamOptions beam;
 
@@ -31,7 +31,7 @@ struct MethodOptions {
   void describe(Fields& field);
 };
 
-/// Problems of the fields' paths.
+/// Adds problems of the fields' paths.
 void append_problems(const MethodOptions& options, std::vector<std::string>& found);
 
 /// Prints the chains of a preset, with the options that replace parts of it, as TOML.

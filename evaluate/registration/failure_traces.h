@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How failed registrations searched, kept within stated bounds.
+// How failed registrations searched, kept to a limited size.
 #pragma once
 
 #include <cstddef>
@@ -15,13 +15,12 @@
 
 namespace af::evaluation {
 
-/// The number of failures of each case and method that keep their traces: those of the lowest start
-/// indices.
+/// How many failures of each case and method keep their traces: those of the lowest start indices.
 inline constexpr std::size_t kMostTraces = 60;
-/// The number of steps that are kept of a trace: the first, the last, and others evenly spread.
+/// How many steps of a trace are kept: the first, the last, and others evenly spread.
 inline constexpr std::size_t kMostTracePoints = 200;
 
-/// A search as seen from the gold pose. `frame` is what the trace's parameters are relative to.
+/// A search as seen from the gold pose. The trace's parameters are relative to `frame`.
 std::vector<TracePoint> trace_points(const std::vector<registration::TraceRow>& trace,
                                      const PoseFrame& frame,
                                      const Yardstick& yardstick);
@@ -29,16 +28,16 @@ std::vector<TracePoint> trace_points(const std::vector<registration::TraceRow>& 
 /// The failures of one case and method that keep their traces, by start index.
 using FirstTraces = std::map<std::int64_t, std::vector<TracePoint>>;
 
-/// Adds the trace of a start, unless it is empty or there are `kMostTraces` of lower indices.
+/// Adds the trace of a start, unless it is empty or there are `kMostTraces` with lower indices.
 /// Starts come in any order. \test FailureTraces.AreKeptOfTheFirstFailuresOfAMethodOnly
 void keep_if_first(std::int64_t start_index, std::vector<TracePoint> trace, FirstTraces& kept);
 
-/// Where a failure's trace is below the run's folder: "traces/CASE-RENDERER-START.csv".
+/// Where a failure's trace lies in the run's folder: "traces/CASE-RENDERER-START.csv".
 std::string trace_file(const std::string& case_name,
                        const std::string& renderer,
                        std::int64_t start_index);
 
-/// stage, step_mm, poses_tried, similarity, rx_deg ... tz_mm (relative to gold), tre_mm.
+/// Columns stage, step_mm, poses_tried, similarity, rx_deg ... tz_mm (relative to gold), tre_mm.
 CsvTable trace_table(const std::vector<TracePoint>& trace);
 
 }  // namespace af::evaluation

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finished registration runs as those who compare them read them.
+// Finished registration runs, as commands that compare them read them.
 #pragma once
 
 #include <functional>
@@ -16,7 +16,7 @@ namespace af::evaluation {
 /// A case as its run's summary states it.
 struct FinishedCase {
   PoseFrame gold_frame;  ///< what the poses of its rows are relative to
-  CtBox target_box_ct;   ///< what distances are means over
+  CtBox target_box_ct;   ///< over which distances are averaged
   bool has_one_view;
 };
 
@@ -26,17 +26,17 @@ struct RunFacts {
   double success_tre_mm = 0.0;
   std::map<std::string, FinishedCase> cases;
 
-  /// FileError when the summary has no such case.
+  /// Throws FileError when the summary has no such case.
   [[nodiscard]] const FinishedCase& case_of(const RegistrationRow& row) const;
 };
 
-/// FileError when the summary does not state them.
+/// Throws FileError when the summary does not state them.
 RunFacts facts_of(const EvaluationRun& run);
 
-/// Calls `receive` with the rows of registrations.csv in order: case, renderer, start index, poses,
-/// TREs, mRPD, one view's depth, error of the rotation, DRRs and seconds; the rest is left as it is
-/// without a registration. `facts`: of the run. FileError when one of these is missing or no
-/// number.
+/// Calls `receive` with the rows of registrations.csv in order. They have case, renderer, start
+/// index, poses, TREs, mRPD, one view's depth, error of the rotation, DRRs and seconds; the rest is
+/// as in a row without a registration. `facts`: those of the run. Throws FileError when one of
+/// these is missing or no number.
 void read_rows(const EvaluationRun& run,
                const RunFacts& facts,
                const std::function<void(const RegistrationRow& row)>& receive);

@@ -50,7 +50,7 @@ CaseEvaluation evaluate_found_poses(const RegistrationStudyOptions& options,
                                     std::vector<RegistrationRow>& rows) {
   CaseEvaluation evaluation;
   evaluation.case_name = study_case.name;
-  // Nothing reads the X-rays, which need not be there.
+  // The X-rays need not exist, because nothing reads them.
   for (const StudyView& view : study_case.views)
     if (std::filesystem::is_regular_file(view.xray))
       evaluation.inputs.identities[study_case.name + ": xray " + view.camera] =

@@ -14,14 +14,14 @@ namespace af::evaluation {
 /// `af-evaluate join-studies` as typed.
 struct JoinStudiesOptions {
   std::vector<std::filesystem::path> studies;
-  std::string fields;  ///< path of every view's field with {case} and {camera}; empty: as they are
+  std::string fields;  ///< path of every view's field with {case} and {camera}; empty to keep them
   std::filesystem::path output = "study.toml";
 
   void describe(Fields& field);
 };
 
-/// One study of all cases, with the first one's rig. InputError when rigs differ or two cases have
-/// one name. \test JoinedStudy.HasAllCasesAndTheirFields
+/// One study with all cases and the first study's rig. Throws InputError when rigs differ or two
+/// cases have the same name. \test JoinedStudy.HasAllCasesAndTheirFields
 Study joined_study(const std::vector<Study>& studies,
                    const std::string& fields,
                    const std::filesystem::path& path);

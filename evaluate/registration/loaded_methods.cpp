@@ -27,7 +27,7 @@ registration::CaseLoadOptions load_options(const MethodOptions& options,
   return result;
 }
 
-/// Blurs of a problem's levels, means over the views.
+/// Blurs of a problem's levels, averaged over the views.
 std::vector<double> level_blurs_mm(const registration::RegistrationProblem& problem) {
   std::vector<double> blurs(problem.views.front().coarse_levels.size(), 0.0);
   for (const registration::RegistrationView& view : problem.views)
@@ -60,7 +60,7 @@ std::vector<LoadedMethod> load_methods(
     registration::CaseLoadOptions loading =
         load_options(options, renderer, method.coarsest_level(), blurs_mm);
     if (its_method.correction.is_wanted) loading.correction_levels = method.last_levels();
-    // Both renderers, so that ends compare.
+    // Both renderers get this step, so that ends can be compared.
     loading.ray_caster.step_mm = correction.cast_step_mm(options.ray_caster.step_mm);
     loading.judging_level = judging_level;
     loading.region_follows_target = method.region_follows_target;

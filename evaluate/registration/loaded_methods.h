@@ -14,21 +14,21 @@
 
 namespace af::evaluation {
 
-/// One renderer with everything that is needed to register a case with it.
+/// One renderer, with everything needed to register a case with it.
 struct LoadedMethod {
   std::string renderer;  ///< "field" or "raycast"
   registration::Registration registration;
 };
 
-/// What a case was loaded from, as "CASE: what"; rank 0.
+/// What a case was loaded from, as "CASE: what". Rank 0 only.
 struct LoadedInputs {
   InputIdentities identities;
-  std::map<std::string, std::string> notes;  ///< how it was read, as af-register says it
+  std::map<std::string, std::string> notes;  ///< how each was read, as af-register says it
 };
 
-/// Collective. The methods of a case, in the order of chosen_renderers(); hashes and notes of the
-/// inputs go to `inputs`. Look-up is corrected where `correction` says so. `judging_level`: as
-/// CaseLoadOptions has it. `kept_fields`: shared by a loop over cases. Throws as load_case() does.
+/// Collective. The methods of a case, in the order of chosen_renderers(). Hashes and notes of the
+/// inputs go to `inputs`. Look-up is corrected where `correction` says so. `judging_level`: as in
+/// CaseLoadOptions. `kept_fields`: shared by a loop over cases. Throws as load_case() does.
 std::vector<LoadedMethod> load_methods(
     const MethodOptions& options,
     const registration::CorrectionOptions& correction,

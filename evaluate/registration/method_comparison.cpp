@@ -126,7 +126,7 @@ CsvCells cells_of(const EvaluationRun& run,
             {"rotation_share_" + name, rotation_share / static_cast<double>(trials)}},
            cells);
   }
-  // NaN without a success: 0 / 0.
+  // 0 / 0 without a success gives NaN.
   const auto successes = static_cast<double>(sums.error_mm.size());
   const SampleSummary error = summarize(sums.error_mm);
   const SampleSummary depth = summarize(sums.depth_mm);
@@ -146,7 +146,7 @@ CsvCells cells_of(const EvaluationRun& run,
   return cells;
 }
 
-/// A test's p, or why it was not made.
+/// A test's p, or the reason why there was no test.
 std::string test_text(const json& p, const json& needed, const std::string& what) {
   return p.is_number() ? number_text(number_of(p)) : "fewer than " + needed.dump() + " " + what;
 }

@@ -32,8 +32,8 @@ bool is_earlier_start(const RegistrationRow* a, const RegistrationRow* b) {
   return std::tie(a->case_name, a->start_index) < std::tie(b->case_name, b->start_index);
 }
 
-/// RowPointers by case and start index; of repeated rows the last. Millions of rows are looked at
-/// through pointers: a map of them would need more memory than they do.
+/// Rows by case and start index; repeated rows leave the last. Pointers are enough: a map of
+/// millions of rows would need more memory than the rows themselves.
 RowPointers rows_by_start(std::span<const RegistrationRow> rows, const std::string& renderer) {
   RowPointers found;
   for (const RegistrationRow& row : rows)
@@ -62,8 +62,8 @@ std::vector<StartPair> pairs_of(std::span<const RegistrationRow> rows) {
 
 /// Sums over the pairs of one patient.
 struct PatientPairs {
-  CaseMean error_difference_mm;  ///< field less ray casting, where both succeeded
-  CaseMean success_difference;   ///< field less ray casting, every common start
+  CaseMean error_difference_mm;  ///< field minus ray casting, where both succeeded
+  CaseMean success_difference;   ///< field minus ray casting, every common start
   CaseMean end_distance_mm;      ///< where both succeeded
 };
 
@@ -72,7 +72,7 @@ struct PairSums {
   std::array<std::vector<double>, 2> seconds;
   std::vector<double> field_error_mm;        ///< where both succeeded
   std::vector<double> raycast_error_mm;      ///< the same
-  std::vector<double> error_differences_mm;  ///< the same: field less ray casting
+  std::vector<double> error_differences_mm;  ///< the same: field minus ray casting
   std::vector<double> distances_mm;          ///< the same
   std::vector<double> all_distances_mm;      ///< where both have an end pose
   std::int64_t only_field = 0;
@@ -124,7 +124,7 @@ json test_json(const PairSums& sums, double margin_mm) {
           {"pairs_for_power_90", pairs_for_equivalence(sd, margin_mm)}};
 }
 
-/// One of the means of every patient that has it.
+/// One of the means, for every patient that has it.
 std::vector<CaseMean> means_of(const std::map<std::string, PatientPairs>& patients,
                                CaseMean PatientPairs::*member) {
   std::vector<CaseMean> means;
@@ -134,11 +134,12 @@ std::vector<CaseMean> means_of(const std::map<std::string, PatientPairs>& patien
 }
 
 /// Methods that succeed from different starts are not equivalent, however close their ends are
-/// where both do: the difference of success rates must be shown to be small, too.
+/// where both succeed. The difference of success rates must therefore be small too.
 constexpr double kSuccessMargin = 0.05;
 
 /// Whether both 95 % intervals over patients of the success difference lie within the margin.
-/// Student's has no ends where all patients are alike; the bootstrap's then are their common value.
+/// Student's has no ends where all patients are alike. The bootstrap's ends are then their common
+/// value.
 bool succeeds_alike(const PairSums& sums, std::uint64_t seed) {
   const json interval =
       interval_over_cases(means_of(sums.patients, &PatientPairs::success_difference), seed);
@@ -150,7 +151,7 @@ bool succeeds_alike(const PairSums& sums, std::uint64_t seed) {
          (!has_spread || (is_small("student_low") && is_small("student_high")));
 }
 
-/// Every patient counts alike, however many pairs it has.
+/// Every patient counts the same, however many pairs it has.
 json end_distance_json(const PairSums& sums, const PairedOptions& options) {
   std::vector<double> patient_means_mm;
   for (const CaseMean& mean : means_of(sums.patients, &PatientPairs::end_distance_mm))
@@ -172,7 +173,7 @@ json end_distance_json(const PairSums& sums, const PairedOptions& options) {
                  {"cases_without_pairs", patients_without_pairs},
                  {"success_margin", kSuccessMargin},
                  {"has_enough_cases", found.has_enough_cases()}};
-  // With too few patients nothing is claimed, neither way.
+  // With too few patients nothing is claimed either way.
   const bool is_shown =
       found.is_shown() && patients_without_pairs == 0 && succeeds_alike(sums, options.seed);
   result["is_equivalent"] = found.has_enough_cases() ? json(is_shown) : json(nullptr);

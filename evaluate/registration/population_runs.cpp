@@ -16,7 +16,8 @@ namespace {
 
 using PatientsByRenderer = std::map<std::string, std::map<std::string, PatientOutcomes>>;
 
-/// Which run has a case by a renderer: a copy of a run would count its starts twice.
+/// The run that has a case by a renderer. Without this check, a copy of a run would count its
+/// starts twice.
 using RunOfCase = std::map<std::pair<std::string, std::string>, std::filesystem::path>;
 
 void add_population_row(const RegistrationRow& row,
@@ -39,7 +40,7 @@ void add_population_row(const RegistrationRow& row,
   outcomes.seconds.push_back(row.seconds);
 }
 
-/// Intervals and threshold, which all runs must share.
+/// The intervals and the threshold, which all runs must share.
 PopulationCounting counting_of(const EvaluationRun& run, std::uint64_t seed) {
   try {
     const nlohmann::json& intervals = run.summary.at("renderers").at(0).at("intervals");

@@ -24,13 +24,13 @@ struct PopulationCondition {
 /// Collects the conditions of a study of many patients.
 class PopulationReader {
  public:
-  /// \param seed of the bootstrap, which counting() hands on
+  /// \param seed for the bootstrap, passed on by counting()
   explicit PopulationReader(std::uint64_t seed) : seed_(seed) {}
 
-  /// Adds NAME=FOLDER: all registration runs below the folder, one condition per renderer.
+  /// Adds NAME=FOLDER: all registration runs below the folder, one condition per renderer. Throws
   /// InputError when the text has another form, when nothing is found, when two runs have the same
   /// case by one renderer, or when a run counts in other intervals or by another threshold than
-  /// those before it; FileError for a broken run.
+  /// those before it. Throws FileError for a broken run.
   void read(const std::string& condition);
 
   [[nodiscard]] const std::vector<PopulationCondition>& conditions() const { return conditions_; }

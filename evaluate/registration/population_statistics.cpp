@@ -16,7 +16,7 @@ std::vector<IntervalSuccess> intervals_of(const std::vector<TreOutcome>& outcome
       outcomes, counting.intervals, counting.interval_width_mm, counting.success_mm);
 }
 
-/// All starts together, interval by interval, and what that becomes when patients are drawn again.
+/// Pools all starts, interval by interval, and again for patients that are drawn anew.
 void pool_intervals(const std::vector<std::vector<IntervalSuccess>>& own,
                     const PopulationCounting& counting,
                     PopulationSuccess& result) {
@@ -60,7 +60,7 @@ std::string half_of(const PatientOutcomes& patient) {
 PopulationSuccess population_success(const std::vector<const PatientOutcomes*>& patients,
                                      const PopulationCounting& counting) {
   PopulationSuccess result;
-  std::vector<std::vector<IntervalSuccess>> own;  // per patient
+  std::vector<std::vector<IntervalSuccess>> own;  // one list per patient
   std::vector<TreOutcome> all;
   std::vector<CaseMean> rates;
   std::vector<CaseMean> ranges_mm;

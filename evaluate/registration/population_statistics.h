@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Success of many patients, each the unit that is sampled.
+// Success over many patients. The patient is the unit that is sampled.
 #pragma once
 
 #include <array>
@@ -24,12 +24,12 @@ struct PopulationCounting {
 struct PatientOutcomes {
   std::string patient;
   std::vector<TreOutcome> outcomes;  ///< ends by RegistrationRow::decisive_mm()
-  std::vector<double> depth_mm;      ///< errors of successes of one view
+  std::vector<double> depth_mm;      ///< errors of successes with one view
   std::vector<double> seconds;
 
-  /// The number at the end of the patient's name; 0: none, such as that of a real CT.
+  /// The number at the end of the patient's name, or 0 when there is none, as for a real CT.
   [[nodiscard]] int number() const;
-  /// What stands before the number: the kind of patient, or the whole name.
+  /// What precedes the number: the kind of patient, or the whole name.
   [[nodiscard]] std::string kind() const;
 };
 
@@ -42,8 +42,8 @@ struct PatientSuccess {
   std::int64_t starts = 0;
   std::int64_t successes = 0;
   ProportionInterval wilson;
-  /// Without an interval: two or three starts per interval of initial TRE hardly tell success rates
-  /// apart, so that what a patient's own starts leave plausible begins at 0.
+  /// Has no interval. Two or three starts per interval of initial TRE hardly tell success rates
+  /// apart, so the range that a patient's own starts leave plausible would begin at 0.
   CaptureRange capture;
 };
 
@@ -53,16 +53,16 @@ struct PopulationSuccess {
   std::int64_t starts = 0;
   std::int64_t successes = 0;
   std::array<std::int64_t, kLadderMm.size()> below_ladder = {};  ///< ends below each threshold
-  /// How many lost a start. Of a rate near 1 it says more than the rate's intervals, which are too
-  /// narrow where few patients lose many.
+  /// How many patients lost a start. At a rate near 1 this says more than the rate's intervals,
+  /// which are too narrow where few patients lose many.
   std::int64_t patients_with_failures = 0;
-  ProportionInterval share_with_failures;  ///< Wilson's, of such patients
-  MeanOverCases rate;        ///< of all starts; every patient has its own number of them
+  ProportionInterval share_with_failures;  ///< Wilson's interval of the share of such patients
+  MeanOverCases rate;        ///< over all starts; patients have different numbers of them
   MeanOverCases capture_mm;  ///< mean of the patients' own capture ranges
-  std::int64_t capture_lower_bounds = 0;   ///< patients whose range is at least the whole study's
-  CaptureRange pooled;                     ///< of all starts together
-  CaseBootstrap pooled_interval_mm;        ///< of the pooled range, by resampling of patients
-  std::vector<IntervalSuccess> intervals;  ///< of all starts together
+  std::int64_t capture_lower_bounds = 0;   ///< patients whose range ends only with the study's
+  CaptureRange pooled;                     ///< over all starts together
+  CaseBootstrap pooled_interval_mm;        ///< of the pooled range, by resampling patients
+  std::vector<IntervalSuccess> intervals;  ///< over all starts together
   std::vector<CaseBootstrap> interval_bootstraps;
 };
 

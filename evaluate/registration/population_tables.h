@@ -15,7 +15,7 @@ namespace af::evaluation {
 struct PopulationGroup {
   std::string condition;
   std::string group;  ///< "all", "odd", "even", "real", or a kind of patient
-  std::string error;  ///< by which ends are counted: "TRE", "mRPD", or both
+  std::string error;  ///< that counts ends: "TRE", "mRPD", or both
   PopulationSuccess success;
   std::string commits;            ///< of the programs that made the condition's runs
   double median_error_mm = kNan;  ///< of successes
@@ -28,7 +28,7 @@ struct PopulationGroup {
 std::vector<PopulationGroup> groups_of(const PopulationCondition& condition,
                                        const PopulationCounting& counting);
 
-/// population.csv: a row per condition and group; `success_mm`: below which an end counts.
+/// population.csv: a row per condition and group. Ends below `success_mm` count as successes.
 CsvTable population_table(const std::vector<PopulationGroup>& groups, double success_mm);
 /// patients.csv: a row per condition and patient.
 CsvTable patients_table(const std::vector<PopulationGroup>& groups);

@@ -24,11 +24,11 @@ struct EndPose {
   RigidTransform room_from_ct;
 };
 
-/// Starts that one run drew and another read from its starts.csv differ by rounding, which stays
-/// far below this; starts that were drawn apart are further from each other.
+/// When one run draws starts and another reads them from its starts.csv, they differ by rounding,
+/// which stays far below this. Starts that were drawn separately differ by more.
 constexpr double kSameStartMm = 1e-6;
 
-/// SHA-256 of a case's X-rays by camera; none where the run does not state them.
+/// SHA-256 of a case's X-rays by camera. None where the run does not state them.
 using XrayHashes = std::map<std::string, nlohmann::json>;
 
 /// The registrations of one case by one renderer of a run.
@@ -36,7 +36,7 @@ struct MethodEnds {
   std::string run, renderer, case_name;
   XrayHashes xrays;
   std::vector<Eigen::Vector3d> points_ct_mm;
-  std::map<std::int64_t, EndPose> ends;  ///< by start index; those with a pose
+  std::map<std::int64_t, EndPose> ends;  ///< by start index; only those with a pose
 };
 
 XrayHashes xrays_of(const EvaluationRun& run, const std::string& case_name) {
@@ -49,7 +49,7 @@ XrayHashes xrays_of(const EvaluationRun& run, const std::string& case_name) {
   return hashes;
 }
 
-/// InputError when ends would be compared that were found in different X-rays.
+/// Throws InputError when the ends to compare were found in different X-rays.
 void require_same_xrays(const MethodEnds& a, const MethodEnds& b) {
   if (a.xrays.empty() || b.xrays.empty()) return;
   for (const auto& [of, other] : {std::pair(&a, &b), std::pair(&b, &a)})
@@ -91,7 +91,7 @@ struct Distances {
   std::vector<double> mm, deg;
 };
 
-/// Of starts that both have.
+/// Distances for starts that both have.
 Distances distances_of(const MethodEnds& a, const MethodEnds& b) {
   Distances distances;
   for (const auto& [index, end] : a.ends) {
@@ -160,8 +160,8 @@ CsvTable pose_distances_table(const std::vector<PoseDistanceRow>& rows) {
 std::vector<PatientDistances> distances_over_patients(const std::vector<PoseDistanceRow>& rows,
                                                       double margin_mm) {
   std::vector<PatientDistances> methods;
-  // By patient: who may have several poses, and each of these several rows, as runs of one name and
-  // both orders of two methods do.
+  // Grouped by patient: a patient may have several poses, and each of these several rows, as for
+  // runs with the same name, or for two methods in both orders.
   std::vector<std::map<std::string, std::vector<double>>> means_mm;
   for (const PoseDistanceRow& row : rows) {
     const auto is_same = [&](const PatientDistances& other) {

@@ -11,22 +11,22 @@
 
 namespace af::evaluation {
 
-/// How far a pose T lies from the gold pose G, beside its mean TRE (tre.h). Means are over target
-/// points p and over cameras; docs/errors.md has the formulas and where they come from.
+/// How far a pose T lies from the gold pose G, besides its mean TRE (tre.h). Means are over target
+/// points p and over cameras. docs/errors.md has the formulas and their sources.
 struct RegistrationErrors {
   static constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 
-  /// Reprojection distance: of G p from the line through the source and T p (van de Kraats 2005).
+  /// Reprojection distance: from G p to the line through the source and T p (van de Kraats 2005).
   double mrpd_mm = kMissing;
-  double projection_detector_mm = kMissing;   ///< distance of both projections on the detector
+  double projection_detector_mm = kMissing;   ///< distance between both projections on the detector
   double projection_isocenter_mm = kMissing;  ///< the same on the plane through the isocentre
   double rotation_deg = kMissing;             ///< angle of the rotation between the two poses
-  double translation_mm = kMissing;           ///< distance of T c from G c, c the ROI centre
-  /// How far T moves the target's centre along the beam (source to centre by G), to either side:
-  /// what one view hardly shows. NaN with more views.
+  double translation_mm = kMissing;  ///< distance between T c and G c, where c is the ROI centre
+  /// How far T moves the target's centre along the beam (from source to centre by G), signed. One
+  /// view hardly shows this. NaN with more views.
   double depth_mm = kMissing;
 
-  /// Those that every number of views has, in the order of columns.
+  /// Errors that exist for any number of views, in the order of columns.
   [[nodiscard]] std::array<double, 5> values() const {
     return {mrpd_mm, projection_detector_mm, projection_isocenter_mm, rotation_deg, translation_mm};
   }

@@ -23,7 +23,7 @@ namespace af::evaluation {
 struct TracePoint {
   int stage = 0;  ///< from 1, counted over the chains
   double step_mm = 0.0;
-  std::int64_t poses_tried = 0;  ///< so far, all stages
+  std::int64_t poses_tried = 0;  ///< up to here, over all stages
   double similarity = 0.0;
   std::array<double, 6> deg_mm{};  ///< relative to gold, about the ROI centre
   double tre_mm = 0.0;
@@ -31,24 +31,25 @@ struct TracePoint {
   auto members() { return std::tie(stage, step_mm, poses_tried, similarity, deg_mm, tre_mm); }
 };
 
-/// One registration as evaluated; poses are relative to gold, about the ROI centre. Without an end
-/// pose (stop reasons of failed registrations) similarity, TRE and final parameters are NaN.
+/// One registration as evaluated. Poses are relative to gold, about the ROI centre. Without an end
+/// pose (stop reasons of failed registrations), similarity, TRE and final parameters are NaN.
 struct RegistrationRow : registration::RegistrationRow {
   std::uint64_t draw_index = 0;
-  int interval = 0;                      ///< of initial TRE
-  double stated_pose_tre_mm = kMissing;  ///< against gold_room_from_ct when gold is the fiducials'
+  int interval = 0;  ///< in initial TRE
+  double stated_pose_tre_mm =
+      kMissing;  ///< against gold_room_from_ct when the fiducials give the gold
   RegistrationErrors errors;
-  double squared_distance = kMissing;  ///< Mahalanobis, of the error by the covariance
-  double gold_tre_95_mm = 0.0;         ///< of the gold standard itself; 0 where nobody knows
-  std::string error;                   ///< message of a registration that threw
-  bool has_one_view = false;           ///< of its case
+  double squared_distance = kMissing;  ///< Mahalanobis distance of the error by the covariance
+  double gold_tre_95_mm = 0.0;         ///< of the gold standard itself; 0 where unknown
+  std::string error;                   ///< message of the exception that a registration threw
+  bool has_one_view = false;           ///< of the case
 
-  /// The error by which every success, failure and capture range is counted: TRE, with one view,
-  /// which hardly shows depth, mRPD.
+  /// The error by which every success, failure and capture range is counted. This is TRE, or mRPD
+  /// with one view, which hardly shows depth.
   [[nodiscard]] double decisive_mm() const { return has_one_view ? errors.mrpd_mm : tre_mm; }
-  /// What tables call it.
+  /// Its name in tables.
   [[nodiscard]] const char* decisive_name() const { return has_one_view ? "mRPD" : "TRE"; }
-  /// As the column `success` has it.
+  /// The column `success`.
   [[nodiscard]] bool is_success(double success_mm) const { return decisive_mm() < success_mm; }
   auto members() {
     return std::tuple_cat(registration::RegistrationRow::members(),
@@ -63,13 +64,13 @@ struct RegistrationRow : registration::RegistrationRow {
   }
 };
 
-/// Most starts of a run, all of whose rows rank 0 holds.
+/// Most starts of a run, because rank 0 holds all of its rows.
 inline constexpr std::size_t kMostStarts = 1000000;
 
 /// Some of many rows.
 using RowPointers = std::vector<const RegistrationRow*>;
 
-/// A row, and for some failures how the search went (see failure_traces.h; empty for other rows).
+/// A row and, for some failures, how the search went (failure_traces.h; empty for other rows).
 struct TracedRow {
   RegistrationRow row;
   std::vector<TracePoint> trace;
@@ -77,22 +78,23 @@ struct TracedRow {
   auto members() { return std::tie(row, trace); }
 };
 
-/// registrations.csv with the contract's columns, in the given order; timings last. Where a
-/// correction was wanted, every row has its columns. `success` is is_success(success_tre_mm).
+/// registrations.csv in the given order, timings last. Where a correction was wanted, every row has
+/// its columns. `success` is is_success(success_tre_mm).
 CsvTable registrations_table(std::span<const RegistrationRow> rows,
                              double success_tre_mm = kSuccessTreMm);
 
-/// registrations.csv of any length, a part at a time.
+/// Writes registrations.csv of any length, one part at a time.
 void write_registrations(const std::filesystem::path& path,
                          std::span<const RegistrationRow> rows,
                          double success_tre_mm = kSuccessTreMm);
 
-/// starts.csv: the starts of any number of cases, in order. The file gets its name once finished.
+/// Writes starts.csv: the starts of any number of cases, in order. The file gets its name once
+/// finished.
 class StartsFile {
  public:
   explicit StartsFile(std::filesystem::path path);
   void add(const std::string& case_name, std::span<const PerturbedStart> starts);
-  /// FileError when it cannot be written whole.
+  /// Throws FileError when it cannot be written whole.
   void finish();
 
  private:

@@ -47,8 +47,8 @@ std::vector<double> finite_values_of(const RowPointers& rows, const Value& value
   return values;
 }
 
-/// Mean, SD and standard error of the signed final error of each parameter: over successes, how
-/// far the optimum itself lies from the gold pose.
+/// Mean, SD and standard error of the signed final error of each parameter. Over successes, they
+/// say how far the optimum itself lies from the gold pose.
 json bias_json(const RowPointers& successful) {
   json result = json::object();
   for (std::size_t i = 0; i < kParameterNames.size(); ++i) {
@@ -64,7 +64,7 @@ json bias_json(const RowPointers& successful) {
   return result;
 }
 
-/// Quartiles, median and 95th percentile, where missing values count as infinitely far.
+/// Quartiles, median and 95th percentile. Missing values count as infinitely far.
 json summary_of_all(std::vector<double> values) {
   for (double& value : values)
     if (!std::isfinite(value)) value = std::numeric_limits<double>::infinity();
@@ -74,7 +74,7 @@ json summary_of_all(std::vector<double> values) {
   return result;
 }
 
-/// Of each of the errors beside TRE.
+/// Summaries of each of the errors besides TRE.
 template <typename SummaryOf>
 json errors_json(const SummaryOf& summary_of) {
   json result = json::object();
@@ -84,8 +84,8 @@ json errors_json(const SummaryOf& summary_of) {
   return result;
 }
 
-/// Why a registration that did not succeed failed: "left range" (start outside, or pinned at the
-/// limit of the field or of its motion range), "budget", "numerics" (an exception, or no finite
+/// Why a registration failed: "left range" (the start was outside, or the end is pinned at the
+/// limit of the field or its motion range), "budget", "numerics" (an exception, or no finite
 /// similarity), "no CT in region", "no pose given" (by another program), or "other optimum" for one
 /// that converged elsewhere.
 std::string failure_reason(const RegistrationRow& row) {
@@ -104,7 +104,7 @@ RowPointers of_one_view(RowPointers rows) {
   return rows;
 }
 
-/// Success, errors, reasons and times of some rows.
+/// Success, errors, failure reasons and times of some rows.
 json statistics_of(const RowPointers& rows, const StatisticsOptions& options) {
   const auto tre_mm = [](const RegistrationRow& row) { return row.tre_mm; };
   const auto error_mm = [](const RegistrationRow& row) { return row.decisive_mm(); };
@@ -169,14 +169,14 @@ json over_patients_json(const std::map<std::string, RowPointers>& by_patient,
   json result = {{"rate", interval_over_cases(rates, options.seed)},
                  {"mean_error_of_successes_mm", interval_over_cases(successful_mm, options.seed)}};
   add_capture_over_patients(by_patient, options, result);
-  // Student's interval does not know that rates end at 0 and 1.
+  // Student's interval is cut because it does not know that rates end at 0 and 1.
   for (const char* name : {"student_low", "student_high"})
     if (json& end = result["rate"][name]; end.is_number())
       end = std::clamp(end.get<double>(), 0.0, 1.0);
   return result;
 }
 
-/// RowPointers whose renderer, case and start index an earlier row has, too; ascending.
+/// Rows whose renderer, case and start index an earlier row has too, in ascending order.
 RowPointers repeated_rows(std::span<const RegistrationRow> rows) {
   const auto key = [](const RegistrationRow* row) {
     return std::tie(row->case_name, row->renderer, row->start_index);

@@ -23,7 +23,7 @@ bool is_of_case(const CsvTable& table, std::size_t row, const PoseTableFrames& f
   throw InputError("case", "no such column", "is needed with several cases", table.where(row));
 }
 
-/// A number of a table; NaN where it says nan or nothing. FileError for other text.
+/// A number of a table; NaN where it says nan or is empty. Throws FileError for other text.
 double number_or_nan(const CsvTable& table, std::size_t row, const std::string& column) {
   const std::string& text = table.text(row, column);
   if (text.empty() || text == "nan" || text == "NaN" || text == "-nan" || text == "inf" ||
@@ -121,7 +121,7 @@ FoundPoses read_table(const std::filesystem::path& path, const PoseTableFrames& 
   return found;
 }
 
-/// Case and start index of "[CASE-]INDEX"; nullopt when it does not end in a number.
+/// Case and start index of "[CASE-]INDEX". nullopt when it does not end in a number.
 std::optional<std::pair<std::string, std::int64_t>> split_stem(const std::string& stem) {
   const std::size_t last = stem.find_last_not_of("0123456789");
   const std::size_t digits = last == std::string::npos ? 0 : last + 1;
@@ -131,7 +131,7 @@ std::optional<std::pair<std::string, std::int64_t>> split_stem(const std::string
   return std::pair(stem.substr(0, digits > 0 ? digits - 1 : 0), std::stoll(stem.substr(digits)));
 }
 
-/// Whether a file of a folder may be one of poses, by its name.
+/// Whether a file of a folder may hold poses, judging by its name.
 bool is_named_like_a_pose(const std::filesystem::path& path) {
   static const std::set<std::string> extensions = {
       ".tfm", ".h5", ".dcm", ".json", ".toml", ".tra", ".txt"};  // foreign ones are refused by name
@@ -153,7 +153,7 @@ void require_only_case(const std::filesystem::path& path, const PoseTableFrames&
                      ": does not say of which case its poses are; choose one with --case");
 }
 
-/// Reads such a file: frame 1 is start 0.
+/// Reads such a file. Frame 1 is start 0.
 FoundPoses read_frames(const std::filesystem::path& path, const PoseTableFrames& frames) {
   require_only_case(path, frames);
   const PosesInFile file = read_pose_file(path, frames.context);

@@ -26,13 +26,13 @@ namespace {
 
 constexpr std::array<double, 3> kConfidences = {0.5, 0.9, 0.99};
 
-/// Whether a row's error lies in its region; rows without one do not count.
+/// Whether a row's error lies in its region. Rows without a region do not count.
 struct Region {
   std::function<bool(const RegistrationRow&)> is_known;
   std::function<bool(const RegistrationRow&)> holds;
 };
 
-/// Of the ends with a median error, the lower of two; `ends` is not empty.
+/// The end with the median error, or the lower of the middle two. `ends` is not empty.
 const RegistrationRow& median_end(RowPointers ends) {
   const auto middle = ends.begin() + (std::ssize(ends) - 1) / 2;
   std::nth_element(ends.begin(), middle, ends.end(), [](const auto* a, const auto* b) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What poses are measured against; the same for our own registrations and for poses of other
-// programs.
+// What poses are measured against, the same for our own registrations and for other programs'
+// poses.
 #pragma once
 
 #include <array>
@@ -14,19 +14,19 @@
 
 namespace af::evaluation {
 
-/// The gold pose of one case and all that errors are defined by.
+/// The gold pose of one case, and everything that defines errors.
 struct Yardstick {
   PoseFrame gold_frame;
   RigidTransform gold_room_from_ct = RigidTransform::Identity();
   double gold_tre_95_mm = 0.0;                ///< 95 % quantile of the gold standard's own TRE
-  std::optional<RigidTransform> stated_pose;  ///< only beside fiducials
+  std::optional<RigidTransform> stated_pose;  ///< only where fiducials give the gold
   std::vector<Eigen::Vector3d> points_ct_mm;
   Eigen::Vector3d center_ct_mm = Eigen::Vector3d::Zero();  ///< c_roi
   CameraRig rig;                                           ///< the cameras of the case's views
 
   [[nodiscard]] bool has_one_view() const { return rig.cameras.size() == 1; }
 
-  /// Of parameters as rows have them.
+  /// The pose of parameters as rows have them.
   [[nodiscard]] RigidTransform pose_of(const std::array<double, 6>& deg_mm) const {
     return pose_from_parameters(gold_frame, PoseParameters::from_deg_and_mm(deg_mm));
   }

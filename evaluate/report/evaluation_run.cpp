@@ -16,7 +16,7 @@ namespace {
 constexpr const char* kFormat = "attenuation-fields evaluation";
 constexpr int kVersion = 1;
 
-/// Folders with a summary.json, the given one and those below it.
+/// Collects folders with a summary.json: the given one and those below it.
 void collect(const std::filesystem::path& folder, std::set<std::filesystem::path>& found) {
   std::error_code error;
   if (!std::filesystem::is_directory(folder, error))
@@ -59,13 +59,13 @@ std::vector<EvaluationRun> find_runs(const std::vector<std::filesystem::path>& f
     const std::filesystem::path path = folder / "summary.json";
     EvaluationRun run{folder, json_of_text(read_text_file(path), path.string())};
     if (!run.summary.is_object()) throw FileError(path.string(), "is no JSON object");
-    // Other programs may leave a summary.json, too.
+    // Other programs may leave a summary.json too.
     if (run.summary.value("format", json()) != kFormat) continue;
     const json version = run.summary.value("format_version", json());
     if (version != kVersion)
       throw FileError(path.string(), "format_version", std::to_string(kVersion), version.dump());
     if (run.summary.value("kind", json()) != "registration") continue;
-    // When its own folder was named, the repeat of a start is a run like any other.
+    // The repeat of a start counts as a run like any other only when its own folder was named.
     if (run.summary.contains("only_start") && !named.contains(folder)) continue;
     runs.push_back(std::move(run));
   }

@@ -29,7 +29,7 @@ std::string program_path() {
   return std::filesystem::exists(beside, error) ? beside.string() : kName;
 }
 
-/// Its exit status; what it says of errors goes to `errors`.
+/// Runs a program and returns its exit status. What it says of errors goes to `errors`.
 int exit_status(std::vector<std::string> words, int errors) {
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
@@ -49,7 +49,7 @@ int exit_status(std::vector<std::string> words, int errors) {
   return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }
 
-/// The last line, without the program's name.
+/// The last line, without the name of the program.
 std::string message_of(std::string text) {
   while (!text.empty() && text.back() == '\n') text.pop_back();
   text.erase(0, text.rfind('\n') + 1);

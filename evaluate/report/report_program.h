@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// af-report (python/af-report), which makes of results what people read: figures, tables, pages.
+// af-report (python/af-report) turns results into what people read: figures, tables, pages.
 #pragma once
 
 #include <string>
@@ -9,9 +9,9 @@
 
 namespace af::evaluation {
 
-/// Rank 0. Runs af-report, which stands beside this program or is found in PATH; its standard
-/// output is ours. InputError and FileError with its message when it ends with 3, or cannot be run
-/// or ends otherwise.
+/// Rank 0. Runs af-report, which is beside this program or in PATH. Its standard output is ours.
+/// When it ends with 3, throws InputError with its message. When it cannot be run or ends
+/// otherwise, throws FileError.
 void run_af_report(const std::vector<std::string>& arguments);
 
 /// Rank 0, when all numbers are written. Makes the figures and tables beside them. Where af-report

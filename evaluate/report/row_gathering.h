@@ -16,8 +16,8 @@
 namespace af::evaluation {
 
 /// Collective. The rows of items 0 ... count - 1. The ranks share the items that no earlier run has
-/// finished, and save their rows (see ResumableItems). Rank 0 gets all rows, other ranks as many
-/// empty ones. Rank 0 prints the progress of `what`, unless that is empty.
+/// finished, and save their rows (see ResumableItems). Rank 0 gets all rows, and other ranks get as
+/// many empty ones. Rank 0 prints the progress of `what`, unless that is empty.
 template <typename Row, typename RowOfItem>
 std::vector<Row> collected_rows(const Communicator& world,
                                 const UnfinishedWork& unfinished,
@@ -38,8 +38,8 @@ std::vector<Row> collected_rows(const Communicator& world,
 }
 
 /// Rank 0 works on a sample, which returns how many times as long an item takes, and says how long
-/// `count` items will take on all ranks. When the sample fails, nothing is said: the run itself
-/// will report why.
+/// `count` items will take on all ranks. When the sample fails, nothing is printed, because the run
+/// itself will report why.
 void announce_time(const Communicator& world,
                    const std::string& what,
                    std::int64_t count,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A table in Markdown, and the same as CSV beside it.
+// A table as Markdown, and as CSV beside it.
 #pragma once
 
 #include <filesystem>
@@ -8,10 +8,10 @@
 
 namespace af::evaluation {
 
-/// Where the CSV of a table in Markdown stands: its name, .csv.
+/// The path of the CSV beside a Markdown table: the same name with .csv.
 std::filesystem::path csv_beside(const std::filesystem::path& markdown);
 
-/// Why --output cannot name the table in Markdown; empty when it can.
+/// Why --output cannot name the Markdown table; empty when it can.
 std::vector<std::string> table_problems(const std::filesystem::path& output);
 
 }  // namespace af::evaluation

@@ -17,7 +17,7 @@ namespace af {
 
 namespace {
 
-/// Samples of the plane through the axis: along the tangent and along the axis, mm. A line of
+/// Samples of the plane through the axis, along the tangent and along the axis, mm. A line of
 /// constant tangent coordinate is contiguous, because back projection walks along the axis.
 struct AxisPlane {
   int tangents = 0;
@@ -27,7 +27,7 @@ struct AxisPlane {
   [[nodiscard]] double height_mm(int i) const { return (i - 0.5 * (heights - 1)) * pitch_mm; }
 };
 
-/// A displaced detector sees one side of the object only, and half a turn on the other one.
+/// A displaced detector sees only one side of the object, and half a turn later the other.
 class DetectorDisplacement {
  public:
   explicit DetectorDisplacement(const CircularScan& scan) : radius_mm_(scan.source_to_axis_mm) {
@@ -39,14 +39,15 @@ class DetectorDisplacement {
     reach_mm_ = is_displaced_ ? view.wide_mm : view.narrow_mm;
   }
 
-  /// Of the cylinder that the full circle sees: a ray that just misses the detector passes the axis
-  /// there.
+  /// Radius of the cylinder that the full circle sees. A ray that just misses the detector passes
+  /// the axis at this distance.
   [[nodiscard]] double seen_radius_mm() const {
     return radius_mm_ * std::sin(std::atan(reach_mm_ / radius_mm_));
   }
 
-  /// What a ray counts: it and the opposite one together 2 (G. Wang, Med. Phys. 29:1634, 2002), so
-  /// that the sum is smooth although one of them is often not measured.
+  /// The weight of a ray. It and the opposite ray have 2 together (G. Wang, Med. Phys. 29:1634,
+  /// 2002). The weight is smooth, so that the sum is too, although often only one of the two is
+  /// measured.
   [[nodiscard]] double weight(double across_mm) const {
     if (!is_displaced_) return 1.0;
     const double to_narrow = narrow_sign_ * across_mm;
@@ -70,7 +71,7 @@ double axis_pixel_mm(const CircularScan& scan) {
 
 /// Whether the object reaches beyond the detector: the ends of the lines across the axis attenuate.
 bool is_truncated(const CircularScan& scan, std::span<const ScanView> views) {
-  constexpr double kLeastShare = 0.1;  // of the mean attenuation
+  constexpr double kLeastShare = 0.1;  // share of the mean attenuation
   const bool lines_are_columns = scan.axis_along == AxisAlong::Columns;
   double ends = 0.0;
   double all = 0.0;
@@ -90,8 +91,8 @@ bool is_truncated(const CircularScan& scan, std::span<const ScanView> views) {
   return ends > kLeastShare * all;
 }
 
-/// How wide the plane is over what the detector sees: the beam need not meet the detector where it
-/// is stated to; a truncated object goes on beside it.
+/// Width of the plane relative to what the detector sees. The beam need not meet the detector where
+/// it is stated to, and a truncated object continues beside it.
 constexpr double kMargin = 1.1;
 constexpr double kTruncatedMargin = 1.6;
 
@@ -131,9 +132,9 @@ std::vector<float> ramp_kernel(const AxisPlane& plane, double smoothing_px) {
   return kernel;
 }
 
-/// Beside the detector an object is taken to go on as at the detector's edge, and to end softly
-/// within a quarter of the detector's width: an end at the edge would be the brightest thing of the
-/// filtered line.
+/// Beside the detector, an object is assumed to continue as at the detector's edge, and to end
+/// softly within a quarter of the detector's width. An abrupt end at the edge would be the
+/// brightest part of the filtered line.
 double beyond_edge_weight(double position_px, int size_px) {
   constexpr double kShare = 0.25;
   const double beyond = std::max(-position_px, position_px - (size_px - 1));
@@ -195,7 +196,7 @@ std::vector<float> filtered_columns(const std::vector<float>& lines,
   return columns;
 }
 
-/// Of one view, what back projection needs.
+/// What back projection needs of one view.
 struct FilteredView {
   double cosine = 1.0;
   double sine = 0.0;

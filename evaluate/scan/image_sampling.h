@@ -7,16 +7,16 @@
 
 namespace af {
 
-/// The image between pixel centres by cubic convolution (Keys, IEEE TASSP 29:1153, 1981); beyond
-/// its edges the outermost pixels go on.
+/// The image between pixel centres by cubic convolution (Keys, IEEE TASSP 29:1153, 1981). Beyond
+/// its edges the outermost pixels continue.
 double sampled_cubic(const Image2d& image, double column, double row);
 
-/// Means of factor x factor pixels; columns and rows that fill none are left out.
+/// Means of factor x factor pixels. Columns and rows that fill none are left out.
 Image2d binned_image(const Image2d& image, int factor);
 
-/// Gaussian of `fine_px` minus Gaussian of `coarse_px` (standard deviations): edges and structures,
-/// without what varies slowly, such as scatter. Pixels that are not valid neither enter nor come
-/// out: they are 0. \test BandPass.LeavesOutInvalidPixels
+/// Gaussian of `fine_px` minus Gaussian of `coarse_px` (standard deviations). It keeps edges and
+/// structures, without what varies slowly, such as scatter. Invalid pixels contribute nothing, and
+/// are 0 in the result. \test BandPass.LeavesOutInvalidPixels
 class BandPass {
  public:
   /// `is_valid`: one entry per pixel of images of width x height.
@@ -28,7 +28,7 @@ class BandPass {
   std::vector<unsigned char> is_valid_;
   double fine_px_;
   double coarse_px_;
-  Image2d fine_weight_;  ///< of valid pixels within the Gaussian
+  Image2d fine_weight_;  ///< share of valid pixels within the Gaussian
   Image2d coarse_weight_;
 };
 

@@ -16,7 +16,7 @@ namespace {
 constexpr const char* kGiveFlat =
     "state flat (an image without the object) or flat_level (the counts of the open beam)";
 
-constexpr int kTerms = 10;  // of a cubic polynomial of two variables
+constexpr int kTerms = 10;  // terms of a cubic polynomial of two variables
 using Terms = Eigen::Matrix<double, kTerms, 1>;
 
 Terms cubic_terms(double x, double y) {
@@ -25,7 +25,7 @@ Terms cubic_terms(double x, double y) {
   return terms;
 }
 
-/// Lines across the rotation axis: each is a column of an image whose axis runs along columns.
+/// Lines across the rotation axis. Each is a column of an image whose axis runs along columns.
 struct LinesAcross {
   const Image2d& image;
   bool are_columns;
@@ -53,7 +53,7 @@ double median(std::vector<double> values) {
   return *at;
 }
 
-/// Dark pixels that hang together with the ends of the lines.
+/// Pixels that are not dark, or not connected with the ends of the lines through dark ones.
 std::vector<unsigned char> lit_pixels(const Image2d& mean, bool lines_are_columns) {
   constexpr float kDarkShare = 0.25F;
   const float dark = kDarkShare * percentile(mean.pixels, 0.99);
@@ -77,7 +77,7 @@ std::vector<unsigned char> lit_pixels(const Image2d& mean, bool lines_are_column
     visit(line, at - 1);
     visit(line, at + 1);
   }
-  // The aperture's edge is a penumbra: the neighbours of dark pixels go, too.
+  // The aperture's edge is a penumbra, so the neighbours of dark pixels are excluded too.
   constexpr int kPenumbraPx = 3;
   for (int round = 0; round < kPenumbraPx; ++round) {
     const std::vector<unsigned char> before = is_lit;
@@ -105,8 +105,8 @@ class AirModel {
     return terms(line, position).dot(polynomial_) + stripes_[static_cast<std::size_t>(line)];
   }
 
-  /// Least squares over the chosen pixels, then one factor per line from what the polynomial
-  /// leaves, where a line has pixels enough.
+  /// Fits by least squares over the chosen pixels, then takes one factor per line from what the
+  /// polynomial leaves, where a line has enough pixels.
   void fit(const std::vector<double>& log_mean, const std::vector<unsigned char>& is_chosen) {
     Eigen::Matrix<double, kTerms, kTerms> normal =
         1e-9 * Eigen::Matrix<double, kTerms, kTerms>::Identity();
@@ -162,7 +162,7 @@ std::vector<unsigned char> line_ends(const LinesAcross& lines,
   return is_end;
 }
 
-/// Pixels whose logarithm lies within 3 robust standard deviations of the model; the scatter is
+/// Pixels whose logarithm lies within 3 robust standard deviations of the model. The deviation is
 /// that of the pixels chosen so far.
 std::vector<unsigned char> agreeing_pixels(const AirModel& model,
                                            const LinesAcross& lines,
@@ -179,7 +179,7 @@ std::vector<unsigned char> agreeing_pixels(const AirModel& model,
       if (chosen[pixel] != 0) scatter.push_back(rest[pixel]);
     }
   constexpr double kDeviationPerMedian = 1.4826;
-  constexpr double kLeastDeviation = 1e-4;  // of images without noise
+  constexpr double kLeastDeviation = 1e-4;  // for images without noise
   const double limit =
       3.0 * std::max(kLeastDeviation, kDeviationPerMedian * median(std::move(scatter)));
   std::vector<unsigned char> agreeing(log_mean.size(), 0);
@@ -188,7 +188,7 @@ std::vector<unsigned char> agreeing_pixels(const AirModel& model,
   return agreeing;
 }
 
-/// Lit pixels that vary over time as little as air does: noise, not the object passing.
+/// Lit pixels that vary over time as little as air does: they see noise, not the object passing.
 std::vector<unsigned char> steady_pixels(const PixelStatistics& statistics,
                                          const std::vector<unsigned char>& is_lit,
                                          const std::vector<unsigned char>& ends) {
@@ -209,8 +209,8 @@ std::vector<unsigned char> steady_pixels(const PixelStatistics& statistics,
   return is_steady;
 }
 
-/// What lies beside one end of a line in all views need not be air: the object reaches beyond the
-/// detector there, or a holder stands in the beam. The beam itself is not that lopsided.
+/// What lies beside one end of a line in all views need not be air: the object may reach beyond the
+/// detector there, or a holder may stand in the beam. The beam itself is not that lopsided.
 void refuse_shadow_at_one_side(const LinesAcross& lines,
                                const std::vector<double>& log_mean,
                                const std::vector<unsigned char>& ends) {
@@ -239,7 +239,7 @@ void refuse_shadow_at_one_side(const LinesAcross& lines,
 }
 
 /// Whether the pixels taken for air have the same share of the flat: half of them within 2 %. What
-/// an object lets through where it is thinnest changes from place to place.
+/// an object transmits at its thinnest changes from place to place.
 bool is_even_in_air(const AirLevel& level, const std::vector<double>& ratios) {
   std::vector<float> in_air;
   for (std::size_t i = 0; i < ratios.size(); ++i)
@@ -330,7 +330,7 @@ AirLevel air_level_of_flat(const Image2d& flat, const PixelStatistics& statistic
     }
     ratios[i] = static_cast<double>(statistics.mean.pixels[i] / flat.pixels[i]);
   }
-  // The tube may have given somewhat less than for the flat, or more: the brightest ratios are
+  // The tube may have given somewhat less, or more, than for the flat. The brightest ratios are
   // those of air.
   constexpr double kSameExposure = 0.1;
   std::vector<float> lit;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// af-scan: a registration study of real X-rays, whose true pose is known, from a circular scan.
+// af-scan makes a registration study of real X-rays, whose true pose is known, from a circular
+// scan.
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -8,7 +9,7 @@
 #include "cli/bind_options.h"
 #include "evaluate/scan/scan_run.h"
 
-// Outside app_main only the declaration of options can throw, which is a defect of this program.
+// Outside app_main only the declaration of options can throw, and that would be a defect.
 // NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
   using namespace af;

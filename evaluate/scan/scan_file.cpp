@@ -21,7 +21,7 @@ namespace {
 struct IndexPlace {
   std::size_t begin;
   std::size_t length;
-  std::size_t digits;  ///< at least so many, filled with zeros
+  std::size_t digits;  ///< least number of digits, filled with zeros
 };
 
 std::optional<IndexPlace> index_place(const std::string& pattern) {
@@ -39,7 +39,7 @@ std::optional<IndexPlace> index_place(const std::string& pattern) {
   return IndexPlace{open, close - open + 1, static_cast<std::size_t>(inside[2] - '0')};
 }
 
-/// Finite and of a magnitude of at most `most`.
+/// A finite number of a magnitude of at most `most`.
 std::optional<double> get_number(TomlTableReader& reader,
                                  const char* key,
                                  Presence presence,
@@ -97,7 +97,7 @@ void read_geometry(TomlTableReader& reader, CircularScan& scan) {
                        "must be between 0 (the distances were measured) and 0.3");
 }
 
-/// The lines without the blanks around them, which are not empty; # at the beginning is a comment.
+/// The lines without surrounding blanks. Empty lines and those that begin with # are left out.
 std::vector<std::string> lines_of_file(const std::filesystem::path& path) {
   std::istringstream text(read_text_file(path, kMostTomlBytes));
   std::vector<std::string> found;
@@ -110,7 +110,7 @@ std::vector<std::string> lines_of_file(const std::filesystem::path& path) {
   return found;
 }
 
-/// Numbers between blanks or line ends, as many as there are; # begins a comment.
+/// Numbers between blanks or line ends, of any count. # begins a comment.
 std::vector<double> read_angles_file(const std::filesystem::path& path) {
   std::istringstream lines(read_text_file(path, kMostTomlBytes));
   std::vector<double> angles_deg;
@@ -128,7 +128,7 @@ std::vector<double> read_angles_file(const std::filesystem::path& path) {
   return angles_deg;
 }
 
-/// The angles one by one: angles_deg, or the numbers of angles_file.
+/// The angles one by one, from angles_deg or angles_file.
 std::vector<double> read_listed_angles(TomlTableReader& reader,
                                        const std::filesystem::path& folder) {
   for (const char* const key : {"view_count", "step_deg", "first_angle_deg"})
@@ -175,7 +175,7 @@ void read_listed_files(TomlTableReader& reader,
             " for " + std::to_string(file.scan.angles_rad.size()) + " views");
 }
 
-/// Names by a pattern, or of a stack.
+/// Names given by a pattern, or the name of a stack.
 void read_file_pattern(TomlTableReader& reader, ScanFile& file) {
   file.files = reader.get_string("files", Presence::Required).value_or("{}");
   const bool has_braces = file.files.find_first_of("{}") != std::string::npos;
@@ -234,7 +234,7 @@ std::string ScanFile::file_of(int view) const {
   if (!listed_files.empty()) return listed_files.at(static_cast<std::size_t>(view));
   if (is_stack()) return files;
   const IndexPlace place = index_place(files).value();
-  // Both may be 100000 at most: their product is no int.
+  // Both may be up to 100000, so their product does not fit an int.
   std::string index = std::to_string(first_index + std::int64_t{view} * index_step);
   if (index.size() < place.digits) index.insert(0, place.digits - index.size(), '0');
   std::string path = files;

@@ -17,7 +17,7 @@ namespace af {
 
 namespace {
 
-constexpr int kFewestPixels = 16;  ///< on a side of the detector
+constexpr int kFewestPixels = 16;  ///< on each side of the detector
 constexpr double kTurn = 2.0 * std::numbers::pi;
 
 Eigen::Matrix3d turned_about(const Eigen::Vector3d& axis, double angle_rad) {
@@ -34,7 +34,7 @@ std::vector<std::size_t> order_around(const std::vector<double>& within_turn) {
   return order;
 }
 
-/// From each angle to the next one around, in the order of order_around().
+/// The gap from each angle to the next one around the circle, in the order of order_around().
 std::vector<double> gaps_around(const std::vector<double>& within_turn,
                                 const std::vector<std::size_t>& order) {
   std::vector<double> gaps(order.size());
@@ -55,12 +55,13 @@ std::string out_of_range(const std::string& name, double value, const std::strin
   return name + " = " + std::to_string(value) + ": " + constraint;
 }
 
-/// "the views leave 40 degrees of the circle empty, ..." when they do not go all the way round.
+/// "the views leave 40 degrees of the circle empty, ..." when they do not cover the whole circle.
 void note_gaps(const std::vector<double>& angles_rad,
                const std::string& which,
                std::vector<std::string>& found) {
   constexpr double kMostUneven = 3.0;
-  constexpr double kAnyGapRad = 30.0 * kRadPerDeg;  // some views are missing, or all are sparse
+  constexpr double kAnyGapRad =
+      30.0 * kRadPerDeg;  // beyond this, some views are missing, or all are sparse
   const std::vector<double> within_turn = within_one_turn(angles_rad);
   std::vector<double> gaps = gaps_around(within_turn, order_around(within_turn));
   std::sort(gaps.begin(), gaps.end());
@@ -118,7 +119,7 @@ CircularScan CircularScan::binned(int factor) const {
                      std::to_string(size_px.x()) + " x " + std::to_string(size_px.y()),
                      "must keep at least " + std::to_string(kFewestPixels) +
                          " pixels on both sides when binned by " + std::to_string(factor));
-  // Pixel centres are integers: the outer edge, at -1/2, stays.
+  // Pixel centres are integers, and the outer edge, at -1/2, stays.
   if (result.beam_foot_px)
     result.beam_foot_px = (result.beam_foot_px->array() + 0.5) / factor - 0.5;
   return result;
@@ -139,7 +140,7 @@ Eigen::Vector2d CircularScan::stated_foot_px() const {
 AxisView view_at_axis(const CircularScan& scan) {
   const double scale = scan.source_to_axis_mm / scan.source_to_detector_mm;
   const Eigen::Vector2d pixel_mm = scale * scan.pixel_spacing_mm;
-  // From the foot to the outer edges: of the first, and of the last column and row.
+  // From the foot to the outer edges of the first, and of the last column and row.
   const Eigen::Vector2d before =
       pixel_mm.cwiseProduct((scan.stated_foot_px().array() + 0.5).matrix());
   const Eigen::Vector2d behind = pixel_mm.cwiseProduct(scan.size_px.cast<double>()) - before;
@@ -267,7 +268,7 @@ ScanCalibration ScanCalibration::binned(double factor) const {
   ScanCalibration result = *this;
   for (AngleSeries* const series : {&result.column_px, &result.row_px}) {
     series->coefficients /= factor;
-    // Pixel centres are integers: the outer edge, at -1/2, stays.
+    // Pixel centres are integers, and the outer edge, at -1/2, stays.
     series->coefficients[0] += 0.5 / factor - 0.5;
   }
   return result;

@@ -16,7 +16,8 @@ void ScanOptions::describe(Fields& field) {
       .as("-o,--output")
       .required();
   field("force", replaces_output, "Replace the folder if it exists");
-  field("most_px", most_px, "Images are binned until their larger side has at most so many pixels")
+  field(
+      "most_px", most_px, "Images are binned until their larger side has at most this many pixels")
       .within(64, 4096);
   field("enlarge_small",
         enlarges_small,
@@ -37,7 +38,7 @@ void ScanOptions::describe(Fields& field) {
       .within(0.0, 100.0);
   field("mask_deviations",
         mask_deviations,
-        "Mask places where an X-ray differs from its prediction by more than so many standard "
+        "Mask places where an X-ray differs from its prediction by more than this many standard "
         "deviations; 0: no masks")
       .within(0.0, 1000.0);
   field("write_projections",

@@ -14,7 +14,7 @@ namespace af::tools {
 /// What af-scan is asked for.
 struct ScanOptions {
   std::filesystem::path scan;
-  std::filesystem::path folder;  ///< of the images; empty: that of the scan's file
+  std::filesystem::path folder;  ///< with the images; empty: that of the scan's file
   std::filesystem::path output;
   bool replaces_output = false;
   SelfCalibrationOptions calibration;
@@ -26,7 +26,7 @@ struct ScanOptions {
   double max_offset_translation_mm = 5.0;
   double mask_deviations = 6.0;
   bool is_as_stated = false;        ///< the stated geometry is the true one
-  bool writes_projections = false;  ///< all views, for fields that they correct
+  bool writes_projections = false;  ///< writes all views, for fields that they correct
   std::uint64_t seed = 1;
   int threads = 0;
 

@@ -69,7 +69,7 @@ std::vector<Image2d> read_views(const ScanFile& file, const fs::path& folder, in
   return views;
 }
 
-/// Counts above the dark level.
+/// Subtracts the dark level from counts.
 class DarkLevel {
  public:
   DarkLevel(const ScanFile& file, const fs::path& folder, int bin) : level_(file.dark_level) {
@@ -90,7 +90,7 @@ AirLevel air_level(const ScanFile& file,
                    const std::vector<Image2d>& counts,
                    const DarkLevel& dark,
                    int bin) {
-  // Even views alone: the odd ones are what a calibration is judged by.
+  // Only even views count, because a calibration is judged by the odd ones.
   constexpr int kMostViews = 60;
   const int count = static_cast<int>(counts.size());
   const int stride = 2 * std::max(1, count / (2 * kMostViews));
@@ -118,8 +118,8 @@ double share_of(const std::vector<unsigned char>& flags) {
   return static_cast<double>(set) / static_cast<double>(std::max<std::size_t>(1, flags.size()));
 }
 
-/// What the open beam was taken to be, and whether each view was exposed like the others: one that
-/// was not says nothing of the object.
+/// Reports what the open beam was taken to be, and whether each view was exposed like the others.
+/// One that was not tells nothing about the object.
 void report_beam(const ScanFile& file,
                  const AirLevel& level,
                  const std::vector<Image2d>& counts,
@@ -178,9 +178,9 @@ void report_starved(const AirLevel& level,
            "object lets nothing through");
 }
 
-/// Stored numbers become line integrals.
+/// Turns stored numbers into line integrals.
 void scale_attenuation(const ScanFile& file, std::vector<Image2d>& images) {
-  // No detector counts exp(-30) of a beam; a few pixels may be broken.
+  // No detector counts exp(-30) of a beam, but a few pixels may be broken.
   constexpr float kLargest = 30.0F;
   constexpr double kFew = 1e-3;
   float largest = 0.0F;

@@ -11,14 +11,14 @@
 
 namespace af::tools {
 
-/// Takes a line of what was found, for people.
+/// Receives a line about what was found, for people.
 using ReportLine = std::function<void(const std::string&)>;
 
 /// Reads every view of a scan and turns it into line integrals. Images are binned until their
-/// larger side has at most `most_px`. InputError when a file has another size than the scan states
-/// or when there are more files than views, when a view was exposed otherwise than the rest, or
-/// when attenuation is no line integrals; FileError when a file is missing or damaged. `report`
-/// receives what the open beam was taken to be, and warnings.
+/// larger side has at most `most_px`. `report` receives what the open beam was taken to be, and
+/// warnings. Throws InputError when a file has another size than the scan states, when there are
+/// more files than views, when a view was exposed differently from the rest, or when attenuation
+/// does not hold line integrals. Throws FileError when a file is missing or damaged.
 ScanImages read_scan_images(const ScanFile& file,
                             const std::filesystem::path& folder,
                             int most_px,

@@ -58,7 +58,7 @@ CalibratedScan calibrated_scan(const ScanOptions& options,
 void run_scan(const ScanOptions& options,
               const std::string& command_line,
               const Communicator& world) {
-  if (!world.is_root()) return;  // one process does the work, by threads
+  if (!world.is_root()) return;  // one process does the work, with threads
   throw_if_any(problems(options));
   ScanFile file = read_scan_file(options.scan);
   const int enlarged = options.enlarges_small ? room_for_registration(file.scan) : 1;
@@ -70,7 +70,7 @@ void run_scan(const ScanOptions& options,
   const std::filesystem::path images_folder =
       options.folder.empty() ? std::filesystem::absolute(options.scan).parent_path()
                              : options.folder;
-  std::string warnings;  // said again in the end: much may have been printed since
+  std::string warnings;  // repeated at the end: much may have been printed since
   const auto report = [&](const std::string& line) {
     inform(world, line);
     if (line.starts_with("Warning")) warnings += "\n" + line;

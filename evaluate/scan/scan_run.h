@@ -9,8 +9,8 @@
 namespace af::tools {
 
 /// Calibrates a circular scan by its even views, judges that by the odd ones, reconstructs a CT and
-/// writes the study; its root does all of it, by threads, and prints what was found.
-/// InputError for options that cannot be, FileError for files that are missing or damaged.
+/// writes the study. The root does all of it, with threads, and prints what was found. Throws
+/// InputError for impossible options, FileError for files that are missing or damaged.
 void run_scan(const ScanOptions& options,
               const std::string& command_line,
               const Communicator& world);

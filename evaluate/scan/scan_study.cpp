@@ -72,7 +72,7 @@ RegionOfInterest seen_region(const CalibratedScan& scan) {
   return {low_column, low_row, high_column - low_column + 1, high_row - low_row + 1};
 }
 
-/// The box within the object, over which errors are taken: 0.6 of its radius, 0.6 of the height
+/// The box within the object over which errors are taken: 0.6 of its radius, and 0.6 of the height
 /// that is seen from all around.
 CtBox target_box(const CalibratedScan& scan) {
   constexpr double kShare = 0.6;
@@ -135,7 +135,7 @@ const JudgedView& judged(const CalibratedScan& scan, int view) {
   return *found;
 }
 
-/// Measured, mask and what the prediction leaves, side by side.
+/// Draws the X-ray, the mask and what the prediction leaves, side by side.
 void write_view_picture(const CalibratedScan& scan,
                         int view,
                         const Image2d& mask,
@@ -193,7 +193,7 @@ double write_view(const ScanOptions& options,
   return masked_share(mask, region);
 }
 
-/// The response of held-out views that half of them exceed, along columns or rows.
+/// The median response of held-out views, along columns or rows.
 double median_response(const CalibratedScan& scan, int axis) {
   std::vector<float> responses;
   for (const JudgedView& row : scan.calibrated.views)
@@ -201,7 +201,7 @@ double median_response(const CalibratedScan& scan, int axis) {
   return static_cast<double>(nearest_rank(responses, 0.5));
 }
 
-/// What people should know before they trust the study, a line each.
+/// What people should know before they trust the study, one line each.
 std::string warnings_of(const CalibratedScan& scan, double most_masked) {
   std::string text;
   constexpr double kMuchMasked = 0.05;
@@ -272,7 +272,7 @@ void write_held_out(const CalibratedScan& scan, const fs::path& path) {
   write_text_file(path, text);
 }
 
-/// Every second view of the scan as a case of known pose, with X-rays in `folder`.
+/// Every second view of the scan as a case with a known pose, and X-rays in `folder`.
 StudyCase projections_case(const CalibratedScan& scan,
                            const std::string& name,
                            int first_view,
@@ -295,7 +295,7 @@ StudyCase projections_case(const CalibratedScan& scan,
   return result;
 }
 
-/// projections.toml, its rig, and the folder of its X-rays.
+/// Writes projections.toml, its rig, and the folder of its X-rays.
 void write_projections(const CalibratedScan& scan,
                        const RegionOfInterest& region,
                        const fs::path& folder) {
@@ -325,8 +325,8 @@ void write_projections(const CalibratedScan& scan,
 std::vector<ViewPair> odd_view_pairs(const CircularScan& scan, int pairs) {
   const std::vector<int> odd = CircularScan::every(1, 2, static_cast<int>(scan.angles_rad.size()));
   const auto angle = [&](int view) { return scan.angles_rad[static_cast<std::size_t>(view)]; };
-  // Pairs a quarter turn apart have each other's views half a turn on: an odd share of the circle
-  // keeps them apart.
+  // Pairs a quarter turn apart have each other's views half a turn later. An odd share of the
+  // circle keeps them apart.
   std::vector<ViewPair> result;
   for (int pair = 0; pair < pairs; ++pair) {
     const double wanted = 2.0 * std::numbers::pi * pair / pairs + angle(odd.front());
@@ -351,7 +351,7 @@ Image2d mask_of(const CircularScan& scan,
         most_deviations > 0.0 && std::abs(static_cast<double>(residual[i])) > most_deviations
             ? 1.0F
             : 0.0F;
-  // What moved has a border of some pixels, where it was and is.
+  // What moved has a border of some pixels around where it was and is.
   const int around = std::max(2, scan.size_px.maxCoeff() / 80);
   Image2d mask(beyond.width, beyond.height);
   for (std::size_t i = 0; i < mask.pixels.size(); ++i)

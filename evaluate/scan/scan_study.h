@@ -12,20 +12,20 @@
 
 namespace af::tools {
 
-/// A scan with its geometry found and judged, and what the even views reconstruct.
+/// A scan whose geometry has been found and judged, with the reconstruction of the even views.
 struct CalibratedScan {
   std::string name;
-  int enlarged = 1;  ///< all lengths are so many times those of the scan's file
+  int enlarged = 1;  ///< how many times larger all lengths are than in the scan's file
   ScanImages images;
   ScanCalibration calibration;
-  HeldOutResidual as_stated;   ///< of the odd views, before
-  HeldOutResidual calibrated;  ///< and after; its shifts are how far the gold pose can be trusted
-  CtVolume ct;                 ///< of the even views
+  HeldOutResidual as_stated;   ///< of the odd views, before calibration
+  HeldOutResidual calibrated;  ///< after it; its shifts tell how far the gold pose can be trusted
+  CtVolume ct;                 ///< from the even views
   double water_mu_per_mm = 0.0;
   double object_radius_mm = 0.0;
 };
 
-/// Views whose indices differ by about a quarter turn.
+/// Views whose angles differ by about a quarter turn.
 struct ViewPair {
   int first;
   int second;
@@ -34,15 +34,14 @@ struct ViewPair {
 /// Pairs of odd views, the first ones evenly around the circle.
 std::vector<ViewPair> odd_view_pairs(const CircularScan& scan, int pairs);
 
-/// Which pixels of a view are to be used: lit ones where nothing moved. `residual` as in
-/// ViewAlignment.
+/// The pixels of a view to use: lit ones where nothing moved. `residual` as in ViewAlignment.
 Image2d mask_of(const CircularScan& scan,
                 const std::vector<unsigned char>& is_lit,
                 const std::vector<float>& residual,
                 double most_deviations);
 
 /// Writes X-rays, masks, pictures, rig, CT, study, calibration and residuals of a scan into
-/// `folder`. Returns the study's text for people: what was found.
+/// `folder`. Returns what was found, as text for people.
 std::string write_scan_study(const ScanOptions& options,
                              const CalibratedScan& scan,
                              const Provenance& provenance,

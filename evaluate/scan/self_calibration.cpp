@@ -17,18 +17,19 @@ namespace af {
 
 namespace {
 
-/// Smoothing of compared images, pixels of the working resolution.
+/// Smoothing of the compared images, in pixels of the working resolution.
 constexpr double kFinePx = 1.0;
 
-/// The scan with the detector where the calibration has it: what is a pixel at the axis, and with
-/// it every sampling, follows the object's size, so that costs of different distances compare.
+/// The scan with the detector where the calibration has it. A pixel's size at the axis, and with it
+/// every sampling, then follows the object's size, so that costs of different distances can be
+/// compared.
 CircularScan with_distance_of(const CircularScan& scan, const ScanCalibration& calibration) {
   CircularScan result = scan;
   result.source_to_detector_mm = calibration.source_to_detector_mm;
   return result;
 }
 
-/// A volume as the ray caster takes it; negative attenuation counts as none, as in every CT.
+/// A volume as the ray caster takes it. Negative attenuation counts as none, as in every CT.
 AttenuationVolume castable(const MuVolume& volume) {
   const double reference = reference_mu_per_mm(volume);
   return {ct_of(volume, reference), AttenuationModel{reference, -1000}};
@@ -46,8 +47,8 @@ Image2d cast_view(const AttenuationVolume& volume, const CameraGeometry& camera)
   return image;
 }
 
-/// The column (or row) across the axis where the views' common centre of attenuation lies: that of
-/// a full circle is on the axis.
+/// The column (or row) across the axis where the views' common centre of attenuation lies. For a
+/// full circle, that centre is on the axis.
 double axis_position_px(const ScanImages& images, const std::vector<int>& used) {
   const bool along_columns = images.scan.axis_along == AxisAlong::Columns;
   double sum = 0.0;
@@ -68,7 +69,7 @@ double axis_position_px(const ScanImages& images, const std::vector<int>& used) 
   return moment / sum;
 }
 
-/// The band-passed images of a working resolution; made once, used in every round.
+/// The band-passed images of a working resolution, made once and used in every round.
 class Rounds {
  public:
   Rounds(ScanImages images,
@@ -79,7 +80,7 @@ class Rounds {
 
   [[nodiscard]] const ScanImages& images() const { return images_; }
 
-  /// Both halves predicted from each other: returns the mean cost and the step of the harmonics.
+  /// Predicts both halves from each other. Returns the mean cost and the step of the harmonics.
   struct Outcome {
     double cost = 0.0;
     double step_px = 0.0;  ///< root mean square over views, of column and row
@@ -116,7 +117,7 @@ class Rounds {
       }
     }
     outcome.cost /= static_cast<double>(judged_count);
-    // Directions that the images do not tell stay where they are.
+    // The ridge keeps directions that the images do not determine where they are.
     constexpr double kRidge = 1e-6;
     for (Eigen::Index i = 0; i < all; ++i) normal(i, i) *= 1.0 + kRidge;
     const Eigen::VectorXd step = normal.ldlt().solve(right);
@@ -134,7 +135,7 @@ class Rounds {
     return outcome;
   }
 
-  /// Improves `rounds` times; returns the last cost, which is that before the last step.
+  /// Improves `rounds` times. Returns the last cost, which is that before the last step.
   double improve(ScanCalibration& calibration, int rounds) const {
     double cost = 0.0;
     for (int round = 0; round < rounds; ++round) cost = improve(calibration).cost;
@@ -152,11 +153,10 @@ int binning_for(const CircularScan& scan, int most_px) {
   return std::max(1, (scan.size_px.maxCoeff() + most_px - 1) / most_px);
 }
 
-/// A calibration with one soft value changed; column and row follow a changed distance in the
-/// rounds.
+/// One soft value of a calibration. Column and row follow a changed distance in the rounds.
 using SoftValue = double ScanCalibration::*;
 
-/// The lowest of a parabola through three costs, or the lowest of the three.
+/// The minimum of a parabola through three costs, or the lowest of the three.
 double parabola_minimum(const std::array<double, 3>& at, const std::array<double, 3>& cost) {
   const double left = (cost[1] - cost[0]) / (at[1] - at[0]);
   const double right = (cost[2] - cost[1]) / (at[2] - at[1]);
@@ -168,8 +168,8 @@ double parabola_minimum(const std::array<double, 3>& at, const std::array<double
   return std::clamp(minimum, at[0], at[2]);
 }
 
-/// Seeks the soft value within `reach` of where it is: three places, then a narrower three about
-/// the best.
+/// Searches the soft value within `reach` of where it is: at three places, then at a narrower three
+/// about the best.
 void seek(const Rounds& rounds, ScanCalibration& calibration, SoftValue value, double reach) {
   constexpr int kRoundsEach = 2;
   constexpr double kNarrower = 0.3;
@@ -216,7 +216,8 @@ void refuse_other_direction(const ScanImages& images,
   const double other_cost = other.improve(calibration, kRounds);
   std::ostringstream costs;
   costs << cost << " against " << other_cost;
-  // An object that looks alike from all sides tells no direction: noise must not decide.
+  // An object that looks the same from all sides does not tell the direction, and noise must not
+  // decide it.
   constexpr double kClearly = 0.9;
   if (other_cost > kClearly * cost && cost > kClearly * other_cost)
     report("Warning: the images hardly tell which way the scan turns (cost " + costs.str() +
@@ -249,7 +250,7 @@ void SelfCalibrationOptions::describe(Fields& field) {
   field.leave_out(coarse_px, "one value suits every scan");
   field("working_px",
         working_px,
-        "Images are binned until their larger side has at most so many pixels")
+        "Images are binned until their larger side has at most this many pixels")
       .within(32, 4096);
   field("search_px", search_px, "The same while distance and tilt of the detector are sought")
       .within(32, 4096);
@@ -258,7 +259,7 @@ void SelfCalibrationOptions::describe(Fields& field) {
         "The detector's distance, which scales all lengths, is sought within this share of the "
         "stated one; 0: kept. Default: the scan's distance_tolerance")
       .within(0.0, 0.3);
-  field("tilt_deg", tilt_deg, "The detector's tilt is sought within so many degrees; 0: kept")
+  field("tilt_deg", tilt_deg, "The detector's tilt is sought within this many degrees; 0: kept")
       .within(0.0, 10.0);
 }
 
@@ -321,14 +322,14 @@ std::vector<unsigned char> fully_seen_pixels(const CircularScan& scan,
                                              double radius_mm) {
   std::vector<unsigned char> is_seen = is_lit;
   const double radius = scan.source_to_axis_mm;
-  // Where a reconstructed point must be to be seen from everywhere, and how high a ray gets.
+  // Where a reconstructed point must lie to be seen from everywhere, and how high a ray gets.
   const double nearest = (radius - radius_mm) / radius;
   const AxisView view = view_at_axis(scan);
   const double farthest = (radius + radius_mm) / calibration.source_to_detector_mm;
   const bool along_columns = scan.axis_along == AxisAlong::Columns;
   const double foot = (along_columns ? calibration.column_px : calibration.row_px).coefficients[0];
   const double spacing = along_columns ? scan.pixel_spacing_mm.x() : scan.pixel_spacing_mm.y();
-  // A few pixels at the edges, where filters know one side only.
+  // Excludes a few pixels at the edges, where filters see only one side.
   constexpr int kEdgePx = 3;
   std::size_t pixel = 0;
   for (int row = 0; row < scan.size_px.y(); ++row)
@@ -438,8 +439,8 @@ ScanCalibration self_calibrate(const ScanImages& images,
   const double bin_ratio = static_cast<double>(bin) / search_bin;
   calibration = calibration.binned(bin_ratio);
   constexpr double kSmallStepPx = 0.005;
-  // What was found must predict better than what was stated, by more than what its many parameters
-  // follow of the noise of few views.
+  // What was found must predict better than what was stated. The gain must exceed what its many
+  // parameters follow of the noise of few views.
   constexpr double kLeastGain = 0.01;
   ScanCalibration best = stated.binned(bin_ratio);
   ScanCalibration moved = best;
@@ -453,13 +454,13 @@ ScanCalibration self_calibrate(const ScanImages& images,
     line << "Round " << round + 1 << ": cost " << outcome.cost << ", moves by "
          << outcome.step_px * bin << " px";
     report(line.str());
-    // What goes on moving without a gain is where and how the object lies, not the geometry.
+    // What still moves without a gain is the object's place and orientation, not the geometry.
     if (outcome.cost >= lowest) break;
     lowest = outcome.cost;
     best = before;
     if (outcome.step_px < kSmallStepPx) break;
   }
-  // At full resolution noise would count, too.
+  // At full resolution noise would count too.
   constexpr double kMuchUnexplained = 0.25;
   if (lowest > kMuchUnexplained)
     report("Warning: views share little detail with their predictions (cost " +

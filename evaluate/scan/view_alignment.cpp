@@ -25,11 +25,11 @@ Eigen::Vector2d gradient(const Image2d& image, int column, int row) {
           0.5 * (value(column, row + 1) - value(column, row - 1))};
 }
 
-/// What a pixel's residual says: measured - gain * predicted, with its weight.
+/// A pixel's residual: measured - gain * predicted, with its weight.
 struct Residuals {
   double gain = 1.0;
   double scale = 1.0;
-  std::vector<double> value;   ///< of the counted pixels
+  std::vector<double> value;   ///< per counted pixel
   std::vector<double> weight;  ///< Geman and McClure's
 };
 
@@ -76,12 +76,12 @@ Residuals robust_residuals(const std::vector<std::size_t>& pixels,
   return residuals;
 }
 
-/// Mean squares over the 9 x 9 pixels around each.
+/// Mean squares over the 9 x 9 pixels around each pixel.
 std::vector<double> squares_around(const Image2d& image) {
   constexpr int kRadius = 4;
   const auto width = static_cast<std::size_t>(image.width);
   const auto height = static_cast<std::size_t>(image.height);
-  // sums[row][column]: of all pixels above and left.
+  // sums[row][column] covers all pixels above and to the left.
   std::vector<double> sums((width + 1) * (height + 1), 0.0);
   const auto sum = [&](std::size_t column, std::size_t row) -> double& {
     return sums[row * (width + 1) + column];
@@ -108,7 +108,7 @@ std::vector<double> squares_around(const Image2d& image) {
 }
 
 /// ViewAlignment::residual. Edges of what stands still are predicted to a tenth of the detail
-/// around; what moved leaves all of its detail where it is, or where it was.
+/// around them. What moved leaves all of its detail where it is, or where it was.
 std::vector<float> residual_over_expected(const std::vector<std::size_t>& pixels,
                                           const Image2d& predicted,
                                           const Residuals& residuals) {
@@ -124,7 +124,7 @@ std::vector<float> residual_over_expected(const std::vector<std::size_t>& pixels
   return over;
 }
 
-/// Mean of the robust residuals against what they would be for a prediction of nothing.
+/// Mean of the robust residuals, relative to those of a prediction of nothing.
 double relative_cost(const std::vector<std::size_t>& pixels,
                      const Image2d& measured,
                      const Residuals& residuals) {
@@ -151,7 +151,7 @@ ViewAlignment align_view(const Image2d& measured,
   if (pixels.empty()) throw InputError("no pixel of a view counts: the scan shows no object");
   const Residuals residuals = robust_residuals(pixels, measured, predicted);
 
-  // Parameters, then the gain.
+  // The parameters come first, then the gain.
   Eigen::Matrix4d normal = 1e-30 * Eigen::Matrix4d::Identity();
   Eigen::Vector4d right = Eigen::Vector4d::Zero();
   Eigen::Vector2d slopes_product = Eigen::Vector2d::Zero();
@@ -163,7 +163,7 @@ ViewAlignment align_view(const Image2d& measured,
     const int row = static_cast<int>(pixels[i] / static_cast<std::size_t>(predicted.width));
     const Eigen::Vector2d slope = residuals.gain * gradient(predicted, column, row);
     const Eigen::Vector2d measured_slope = gradient(measured, column, row);
-    // Where a point is seen moves by (row, -column) from the foot per rad, in mm.
+    // A point's image moves by (row, -column) from the foot per rad, in mm.
     const double right_of_foot = column - beam_foot_px.x();
     const double below_foot = row - beam_foot_px.y();
     const double turning =

@@ -102,7 +102,8 @@ Vector3d Habitus::operator()(const Vector3d& typical_ct_mm) const {
     point[axis] +=
         wave_mm_ * std::sin(wave_vectors_per_mm_.col(axis).dot(typical_ct_mm) + phases_rad_[axis]);
   const double z_mm = typical_ct_mm.z();
-  // The spine, which stands at x = y = 0, bends more than the chest wall, which stays in the skin.
+  // The spine, which lies at x = y = 0, bends more than the chest wall, which stays within the
+  // skin.
   constexpr double kReachMm = 90.0;
   const double nearness = std::exp(-typical_ct_mm.head<2>().squaredNorm() / (kReachMm * kReachMm));
   const double bend_mm =

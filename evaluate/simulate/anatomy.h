@@ -9,10 +9,10 @@
 
 namespace af {
 
-/// What is different about one patient. Every trait is a draw of its own, keyed by (kind, seed,
-/// trait, index): a trait that is added changes no other. Without a seed it is the typical adult:
-/// every factor 1, every shift 0, and nothing found. Spreads are this project's choice, of the size
-/// of the variation between adults; nothing is fitted to patient data.
+/// What differs in one patient. Every trait is a draw of its own, keyed by (kind, seed, trait,
+/// index), so a new trait changes no other. Without a seed it is the typical adult: every factor is
+/// 1, every shift 0, and nothing is found. Spreads are this project's choice, of the size of the
+/// variation between adults. Nothing is fitted to patient data.
 /// \test Anatomy.TraitsAreIndependentAndTypicalWithoutASeed
 class Anatomy {
  public:
@@ -20,22 +20,22 @@ class Anatomy {
   Anatomy(std::string_view kind, std::uint64_t seed);
 
   [[nodiscard]] bool is_typical() const { return key_ == 0; }
-  /// About 1: exp(spread n), n standard normal within +-2.
+  /// A factor about 1: exp(spread n), where n is standard normal within +-2.
   [[nodiscard]] double factor(std::string_view trait, double spread, int index = 0) const;
-  /// About 0: spread n, n as above.
+  /// A shift about 0: spread n, with the same n.
   [[nodiscard]] double shift(std::string_view trait, double spread, int index = 0) const;
   [[nodiscard]] Eigen::Vector3d shift3(std::string_view trait, double spread, int index = 0) const;
   /// Uniform in [low, high); `typical` without a seed.
   [[nodiscard]] double between(
       std::string_view trait, double low, double high, double typical, int index = 0) const;
-  /// True with that probability; false without a seed.
+  /// True with that probability. False without a seed.
   [[nodiscard]] bool has(std::string_view trait, double probability, int index = 0) const;
 
-  /// Wear of joints and discs: 0 in two of five patients, else up to 1.
+  /// Wear of joints and discs: 0 in two of five patients, otherwise up to 1.
   [[nodiscard]] double arthrosis() const;
-  /// Of cortical shells, times the typical.
+  /// Thickness of cortical shells, relative to the typical one.
   [[nodiscard]] double shell() const { return factor("shell", 0.15); }
-  /// Under the skin, mm more (or less) than typical.
+  /// Fat under the skin, mm more (or less) than typical.
   [[nodiscard]] double fat_mm() const { return between("fat", -5.0, 14.0, 0.0); }
 
  private:
@@ -43,8 +43,8 @@ class Anatomy {
 };
 
 /// A smooth map of the ct frame that turns the typical adult's size and proportions into a
-/// patient's: stretches, long waves (no side mirrors the other), and, where `bends`, scoliosis with
-/// the turn of the vertebrae that goes with it, and more or less kyphosis.
+/// patient's. It has stretches and long waves (no side mirrors the other). Where `bends`, it adds
+/// scoliosis with the turn of the vertebrae that goes with it, and more or less kyphosis.
 class Habitus {
  public:
   /// `wave_mm`: amplitude of the waves.
@@ -60,7 +60,8 @@ class Habitus {
   bool is_typical_ = true;
   Eigen::Vector3d stretch_ = Eigen::Vector3d::Ones();
   double wave_mm_ = 0.0;
-  Eigen::Matrix3d wave_vectors_per_mm_ = Eigen::Matrix3d::Zero();  ///< columns: of x, y, z
+  Eigen::Matrix3d wave_vectors_per_mm_ =
+      Eigen::Matrix3d::Zero();  ///< one column for each of x, y, z
   Eigen::Vector3d phases_rad_ = Eigen::Vector3d::Zero();
   double bend_mm_ = 0.0;  ///< amplitude of the scoliosis
   double bend_wavelength_mm_ = 300.0;

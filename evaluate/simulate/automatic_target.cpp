@@ -46,7 +46,7 @@ Eigen::Vector3d attenuation_centroid(const CtVolume& ct) {
   return ct.grid.point_mm(sum / weight);
 }
 
-/// The outer edges of a CT's voxels as a box along the ct axes.
+/// The outer edges of a CT's voxels, as a box along the ct axes.
 CtBox bounding_box(const CtGrid& grid) {
   const Eigen::Vector3d last(grid.size[0] - 0.5, grid.size[1] - 0.5, grid.size[2] - 0.5);
   const CtBox in_voxels{Eigen::Vector3d::Constant(-0.5), last};
@@ -114,7 +114,7 @@ class BoneTable {
   std::vector<double> sums_;
 };
 
-/// Positions [first, last] that the low corner of a box of `extent` cells may take on an axis.
+/// Positions [first, last] of the low corner of a box of `extent` cells on an axis.
 struct CellRange {
   int first;
   int last;

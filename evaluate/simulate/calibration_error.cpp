@@ -11,12 +11,12 @@ namespace af {
 
 namespace {
 
-/// Errors of one camera, in the proportions they are drawn with.
+/// Errors of one camera, in the proportions in which they are drawn.
 struct CameraErrors {
   double column_px;
   double row_px;
-  double turn_px;      ///< of a point 100 px from the detector's middle
-  double distance_px;  ///< of a point 100 px from the detector's middle, by magnification
+  double turn_px;      ///< shift of a point 100 px from the detector's middle
+  double distance_px;  ///< shift of such a point by magnification
 };
 
 constexpr double kLeverPx = 100.0;
@@ -63,7 +63,7 @@ CameraGeometry camera_with_calibration_error(const CameraGeometry& camera,
   errors.row_px = random.normal();
   errors.turn_px = random.normal();
   errors.distance_px = random.normal();
-  // The shift is nearly proportional to the scale: a few corrections reach rounding.
+  // The shift is nearly proportional to the scale, so a few corrections reach rounding.
   constexpr int kCorrections = 12;
   constexpr double kFirstScale = 1e-3;
   double scale = kFirstScale;

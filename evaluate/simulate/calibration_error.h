@@ -10,7 +10,7 @@
 namespace af {
 
 /// The true camera behind a wrong calibration. Its detector is moved in its plane and turned about
-/// its middle, its source is moved along the beam. The errors are drawn from independent normal
+/// its middle, and its source is moved along the beam. The errors are drawn from independent normal
 /// distributions keyed by (seed, key), and then scaled together so that the projections of the
 /// box's corners move by exactly `error_px` RMS.
 /// \test CalibrationError.MovesTheTargetBoxByTheStatedRms

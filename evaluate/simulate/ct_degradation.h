@@ -7,7 +7,7 @@
 
 namespace af {
 
-/// A poorer CT of the same patient, such as a planning CT of thick slices and low dose.
+/// A poorer CT of the same patient, such as a planning CT with thick slices and a low dose.
 struct CtDegradationOptions {
   double slice_mm = 3.0;   ///< slices are averaged in groups of about this thickness
   double noise_hu = 30.0;  ///< standard deviation, independent from voxel to voxel
@@ -19,9 +19,9 @@ struct CtDegradationOptions {
 int slices_per_group(const CtGrid& grid, double slice_mm);
 
 /// Averages groups of slices (those left over at the end are dropped), adds noise to voxels of at
-/// least `air_below_hu` (lower ones attenuate nothing) and rounds. A voxel lies at the middle of
-/// the voxels that it averages. Noise is keyed by (seed, key, voxel). InputError when fewer than
-/// two groups remain.
+/// least `air_below_hu` (lower ones attenuate nothing), and rounds. A voxel lies at the middle of
+/// the voxels that it averages. Noise is keyed by (seed, key, voxel). Throws InputError when fewer
+/// than two groups remain.
 /// \test DegradedCt.KeepsEveryVoxelWhereItsMeanIs
 CtVolume degraded_ct(const CtVolume& ct,
                      const CtDegradationOptions& options,

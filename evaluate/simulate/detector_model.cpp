@@ -16,7 +16,7 @@ namespace af {
 
 namespace {
 
-/// Means of factor x factor blocks; blocks at the right and lower edge may be smaller.
+/// Means of factor x factor blocks. Blocks at the right and lower edge may be smaller.
 Image2d block_means(const Image2d& image, int factor) {
   Image2d means((image.width + factor - 1) / factor, (image.height + factor - 1) / factor);
   for (int row = 0; row < means.height; ++row)
@@ -33,7 +33,7 @@ Image2d block_means(const Image2d& image, int factor) {
   return means;
 }
 
-/// Values at the fine pixel centres.
+/// Interpolates values at the fine pixel centres.
 Image2d magnify(const Image2d& coarse, int factor, int width, int height) {
   const auto coarse_positions = [factor](int count) {
     std::vector<double> positions;
@@ -98,7 +98,7 @@ Image2d scatter_image(const Image2d& primary,
           return value > 0.0 && value < 1.0 ? static_cast<float>(-value * std::log(value)) : 0.0f;
         });
   }
-  // A quarter of the kernel's width per coarse pixel: the Gaussian stays well sampled.
+  // A coarse pixel is a quarter of the kernel's width, so the Gaussian stays well sampled.
   const double sigma_px = options.scatter_sigma_mm / pixel_spacing_mm;
   const int factor = std::max(1, static_cast<int>(sigma_px / 4.0));
   Image2d scatter = magnify(gaussian_blur(block_means(source, factor), sigma_px / factor),

@@ -29,29 +29,29 @@ struct DetectorOptions {
 
 std::vector<std::string> problems(const DetectorOptions& options);
 
-/// Scatter that reaches the detector, in units of the open beam: its source is primary * -ln
-/// primary (what the object removed from the beam and what it lets through; B. Ohnesorge et al.,
-/// Eur. Radiol. 9:563, 1999), spread by a Gaussian on a decimated grid and scaled to the stated
-/// ratio within `roi`. The open beam is no source; with ScatterSource::ObjectAndOpenBeam the source
-/// is the primary itself, so that what passes beside the object veils its shadow.
+/// Scatter that reaches the detector, in units of the open beam. Its source is primary * -ln
+/// primary: what the object removed from the beam and what it lets through (B. Ohnesorge et al.,
+/// Eur. Radiol. 9:563, 1999). A Gaussian spreads it on a decimated grid, and it is scaled to the
+/// stated ratio within `roi`. The open beam is no source. With ScatterSource::ObjectAndOpenBeam the
+/// source is the primary itself, so that what passes beside the object veils its shadow.
 Image2d scatter_image(const Image2d& primary,
                       const RegionOfInterest& roi,
                       double pixel_spacing_mm,
                       const DetectorOptions& options);
 
 /// The signal under a beam that grows linearly over the rows (the anode's heel effect), from
-/// (1-h)/(1+h) on the first row to 1 on the last: the brightest part keeps the open beam's level.
+/// (1-h)/(1+h) on the first row to 1 on the last. The brightest part keeps the open beam's level.
 Image2d with_heel_ramp(const Image2d& signal, double heel_ramp);
 
-/// Every pixel replaced by a Poisson count around photons_per_pixel * value, divided by
-/// photons_per_pixel; keyed by (seed, key, pixel).
+/// Replaces every pixel by a Poisson count around photons_per_pixel * value, divided by
+/// photons_per_pixel. Keyed by (seed, key, pixel).
 Image2d with_photon_noise(const Image2d& signal,
                           double photons_per_pixel,
                           std::uint64_t seed,
                           std::uint64_t key,
                           int threads);
 
-/// Grey values: signal * open_beam_level, rounded and clamped to the bits (0 bits: neither).
+/// Grey values: signal * open_beam_level, rounded and clamped to the bits (neither with 0 bits).
 Image2d digitise(const Image2d& signal, const DetectorOptions& options);
 
 /// The X-ray of a primary image: scatter, heel effect, noise, blur, grey values, in this order.

@@ -76,14 +76,14 @@ double SteelCylinder::chord_length_mm(const Eigen::Vector3d& source_point,
   const Eigen::Vector3d direction = (through_point - source_point).normalized();
   const Eigen::Vector3d from_center = source_point - center_point;
   Interval inside;
-  // Between the end planes |(o + t d) . a| <= length / 2.
+  // Between the end planes, |(o + t d) . a| <= length / 2.
   const double along = direction.dot(axis_direction);
   const double height = from_center.dot(axis_direction);
   if (along != 0.0)
     inside.intersect((-0.5 * length_mm - height) / along, (0.5 * length_mm - height) / along);
   else if (std::abs(height) > 0.5 * length_mm)
     inside.clear();
-  // Within the radius: a quadratic in t of the parts across the axis.
+  // Within the radius there is a quadratic in t of the parts across the axis.
   const Eigen::Vector3d direction_across = direction - along * axis_direction;
   const Eigen::Vector3d origin_across = from_center - height * axis_direction;
   const double a = direction_across.squaredNorm();

@@ -24,12 +24,13 @@ struct SteelCylinder {
                                        const Eigen::Vector3d& through_point) const;
 };
 
-/// Four pins about 25 mm from each other around `center_ct_mm`, not coplanar: the corners of a
-/// regular tetrahedron of that edge, each moved to the nearest bone (>= 250 HU) that lies within
-/// 10 mm and keeps the pins at least 15 mm apart; a corner without such bone stays where it is.
+/// Four pins about 25 mm from each other around `center_ct_mm`, not coplanar. They are the corners
+/// of a regular tetrahedron with that edge. Each is moved to the nearest bone (>= 250 HU) that lies
+/// within 10 mm and keeps the pins at least 15 mm apart. A corner without such bone stays where it
+/// is.
 std::vector<SteelCylinder> place_fiducials(const CtVolume& ct, const Eigen::Vector3d& center_ct_mm);
 
-/// Detected positions (column, row) of the pins' centres in an X-ray: their projections with
+/// Detected positions (column, row) of the pins' centres in an X-ray: their projections, with
 /// independent normal errors of `sigma_px` in both coordinates, keyed by (seed, key, pin).
 std::vector<Eigen::Vector2d> detect_fiducials(const CameraGeometry& camera,
                                               const RigidTransform& room_from_ct,

@@ -316,7 +316,7 @@ void add_plate(std::vector<Solid>& solids) {
   }
 }
 
-/// An aneurysm's coil, a clip and such that the typical adult lacks.
+/// Adds implants such as an aneurysm's coil or a clip, which the typical adult lacks.
 void add_drawn_implants(const Anatomy& anatomy, bool has_metal, Phantom& phantom) {
   if (has_metal || anatomy.has("plate", 0.12)) {
     add_plate(phantom.solids);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// af-simulate: a whole registration study, with a known answer, from a CT or a phantom.
+// af-simulate makes a whole registration study, with a known answer, from a CT or a phantom.
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -8,7 +8,7 @@
 #include "cli/bind_options.h"
 #include "evaluate/simulate/simulated_study.h"
 
-// Outside app_main only the declaration of options can throw, which is a defect of this program.
+// Outside app_main only the declaration of options can throw, and that would be a defect.
 // NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
   af::tools::SimulateOptions options;

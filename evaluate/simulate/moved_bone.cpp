@@ -38,7 +38,7 @@ std::vector<Vector3d> points_of(const Phantom& phantom, std::string_view bone, H
   return points;
 }
 
-/// Whether all but the bone has soft tissue at a point.
+/// Whether everything but the bone has soft tissue at a point.
 bool has_room(const Phantom& phantom, std::string_view bone, const Vector3d& ct_point_mm) {
   constexpr int kLowestHu = -200;
   constexpr int kHighestHu = 100;  // below thin cancellous bone
@@ -81,11 +81,11 @@ RigidTransform drawn_rest_from_bone(const Phantom& phantom,
 Phantom with_moved_bone(Phantom phantom,
                         std::string_view bone,
                         const RigidTransform& rest_from_bone) {
-  // The body painted last is what is there: nothing is added or taken away. So where a moved body
-  // was, the bodies painted before it come to light, and those of other bones, discs and sockets
-  // are whole. But soft tissue may be missing below: a jaw reaches out of the face, a lung into a
-  // vertebra. Soft tissue is painted before all bone; between the two the bone leaves its shape in
-  // muscle, which no other bone loses by.
+  // The body painted last is what is there: nothing is added or removed. Where a moved body was,
+  // the bodies painted before it therefore show, and those of other bones, discs and sockets are
+  // whole. But soft tissue may be missing below: a jaw reaches out of the face, a lung into a
+  // vertebra. Soft tissue is painted before all bone. Between the two, the bone leaves its shape in
+  // muscle, which takes nothing from other bones.
   std::vector<Solid> left_behind;
   for (Solid& solid : phantom.solids) {
     if (solid.bone != bone) continue;

@@ -13,9 +13,9 @@ namespace af {
 namespace {
 
 constexpr int kMostDraws = 1000;
-constexpr double kLeastRodOffset = 0.2;    // of the reach
-constexpr double kLargestRodOffset = 0.6;  // of the reach
-constexpr double kBallReach = 0.8;         // of the reach
+constexpr double kLeastRodOffset = 0.2;    // share of the reach
+constexpr double kLargestRodOffset = 0.6;  // share of the reach
+constexpr double kBallReach = 0.8;         // share of the reach
 constexpr double kLeastPinDistanceMm = 8.0;
 
 Eigen::Vector3d draw_direction(HashRandom& random) {

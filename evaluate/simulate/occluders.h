@@ -14,7 +14,7 @@ struct SteelBall {
   Eigen::Vector3d center_point = Eigen::Vector3d::Zero();
   double radius_mm = 1.5;
 
-  /// Length (mm) of the half-line from `source_point` through `through_point` inside the ball; the
+  /// Length (mm) of the half-line from `source_point` through `through_point` inside the ball. The
   /// source lies outside. \test SteelBall.ChordsHaveTheirClosedForm
   [[nodiscard]] double chord_length_mm(const Eigen::Vector3d& source_point,
                                        const Eigen::Vector3d& through_point) const;
@@ -25,7 +25,7 @@ struct SteelBodies {
   std::vector<SteelCylinder> cylinders;
   std::vector<SteelBall> balls;
 
-  /// Sum of all chords (mm); where bodies overlap, both count.
+  /// Sum of all chords (mm). Where bodies overlap, both count.
   [[nodiscard]] double chord_length_mm(const Eigen::Vector3d& source_point,
                                        const Eigen::Vector3d& through_point) const;
 };
@@ -42,24 +42,25 @@ struct OccluderOptions {
 struct OccluderSite {
   Eigen::Vector3d center_ct_mm = Eigen::Vector3d::Zero();
   double reach_mm = 0.0;  ///< half the side, at the centre, of the smallest region of interest
-  std::vector<Eigen::Vector3d> beam_directions_ct;  ///< unit; of every view through the centre
+  std::vector<Eigen::Vector3d> beam_directions_ct;  ///< unit; one per view, through the centre
 };
 
 OccluderSite occluder_site(const std::vector<View>& views,
                            const RigidTransform& room_from_ct,
                            const Eigen::Vector3d& center_ct_mm);
 
-/// Rods whose axes pass the centre at 0.2 to 0.6 of the site's reach (drawn uniformly) and make at
-/// least 30 degrees with every beam where 1000 draws find such a direction; keyed by (seed, key,
-/// rod). Every view's region of interest is crossed. \test
+/// Rods whose axes pass the centre at 0.2 to 0.6 of the site's reach (drawn uniformly). They make
+/// at least 30 degrees with every beam if 1000 draws find such a direction. Keyed by (seed, key,
+/// rod). They cross every view's region of interest. \test
 /// PlacedRods.CrossTheRegionOfInterestOfEveryView
 std::vector<SteelCylinder> place_rods(const OccluderSite& site,
                                       const OccluderOptions& options,
                                       std::uint64_t seed,
                                       std::uint64_t key);
 
-/// Balls uniform in a sphere of 0.8 of the site's reach, at least 3 diameters apart and 8 mm from
-/// the centres of `pins` where 1000 draws find such a place; keyed by (seed, key, ball).
+/// Balls distributed uniformly in a sphere of 0.8 of the site's reach. They are at least 3
+/// diameters apart, and 8 mm from the centres of `pins`, if 1000 draws find such a place. Keyed by
+/// (seed, key, ball).
 std::vector<SteelBall> place_balls(const OccluderSite& site,
                                    const std::vector<SteelCylinder>& pins,
                                    const OccluderOptions& options,

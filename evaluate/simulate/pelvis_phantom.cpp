@@ -62,7 +62,7 @@ void add_soft_tissue(const Anatomy& anatomy, std::vector<Solid>& solids) {
   add_gas(anatomy, {{-75.0, -52.0, 40.0}, {75.0, -10.0, 140.0}}, solids);
 }
 
-/// Arthrosis of a hip: one side is often worse.
+/// Arthrosis of a hip. One side is often worse.
 double hip_wear(const Anatomy& anatomy, double side) {
   return anatomy.arthrosis() * anatomy.between("hip wear", 0.2, 1.0, 0.0, side > 0.0 ? 1 : 0);
 }
@@ -95,7 +95,7 @@ void add_ilium(const Anatomy& anatomy, double side, BonePainter& bone) {
   }
   bone.add_chain(rim, 7.5 * thickness);
   bone.add_capsule(mirrored({100.0, -26.0, 26.0}, side), mirrored({108.0, -38.0, 44.0}, side), 8.0);
-  // From the joint to the sacrum, the thick border of the pelvic inlet.
+  // The thick border of the pelvic inlet runs from the joint to the sacrum.
   bone.add_chain({mirrored({82.0, -18.0, 20.0}, side),
                   mirrored({72.0, 14.0, 34.0}, side),
                   mirrored({54.0, 46.0, 52.0}, side)},
@@ -103,7 +103,7 @@ void add_ilium(const Anatomy& anatomy, double side, BonePainter& bone) {
 }
 
 void add_pubis_and_ischium(const Anatomy& anatomy, double side, BonePainter& bone) {
-  // Wider or narrower below: the arch of the pubis.
+  // The arch of the pubis is wider or narrower below.
   const double arch_mm = anatomy.shift("pubic arch", 3.0);
   const double stout = anatomy.factor("pubis", 0.08);
   const auto at = [&](double x, double y, double z) {
@@ -122,7 +122,7 @@ std::string_view femur_of(double side) {
   return side > 0.0 ? kLeftFemur : kRightFemur;
 }
 
-/// Its head, neck and trochanters.
+/// The part of the femur that moves: head, neck and trochanters.
 PhantomBone movable_femur(double side) {
   return {femur_of(side), target_box_at(mirrored({115.0, 5.0, -25.0}, side), 60.0)};
 }
@@ -254,12 +254,12 @@ void add_lumbar_spine(const Anatomy& anatomy, std::vector<Solid>& solids) {
   for (const Vertebra& v : vertebrae) add_vertebra(varied(v, anatomy, v.level), solids);
 }
 
-/// A total hip prosthesis; the bodies are those of the left side. Neck, ball and stem are the
-/// femur's.
+/// A total hip prosthesis. The bodies are those of the left side. Neck, ball and stem belong to the
+/// femur.
 void add_prosthesis(double side, std::vector<Solid>& solids) {
   const std::string_view femur = femur_of(side);
   const auto add = [&](Solid solid, std::string_view bone = {}) {
-    // The mirror image of a body of revolution: its axis mirrored.
+    // The mirror image of a body of revolution is the body with a mirrored axis.
     const Vector3d axis = mirrored(solid.rotation.col(2), side);
     solid.center_mm = mirrored(solid.center_mm, side);
     if (side < 0.0) solid.rotation = rotation_between(Vector3d::UnitZ(), axis);
@@ -267,8 +267,8 @@ void add_prosthesis(double side, std::vector<Solid>& solids) {
     solids.push_back(solid);
   };
   const Vector3d opening = Vector3d(0.66, -0.26, -0.70).normalized();
-  // The places of the socket's lining and of the resected head and neck heal with soft tissue;
-  // liner and metal cup face outwards. Wherever the femur is, its resected head is not.
+  // The places of the socket's lining and of the resected head and neck heal with soft tissue.
+  // Liner and metal cup face outwards. Wherever the femur is, its resected head is gone.
   const Solid healed = ellipsoid(hip_mm, Vector3d::Constant(29.0), kMuscleHu);
   add(healed);
   add(healed, femur);

@@ -19,7 +19,7 @@ struct KnownPhantom {
   Phantom (*make)(bool has_metal, const Anatomy& anatomy);
 };
 
-/// Every phantom there is; a new one joins here.
+/// Every phantom. A new one is added here.
 constexpr std::array kPhantoms = {
     KnownPhantom{"spine", "trunk from T8 to L4 with ribs and organs", spine_phantom},
     KnownPhantom{"pelvis", "L4 to the upper thighs", pelvis_phantom},

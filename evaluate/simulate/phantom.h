@@ -12,8 +12,8 @@ std::string phantom_help();
 /// The bones of each phantom that can be moved: "spine: T9, T10 ...; pelvis: ...".
 std::string bone_help();
 
-/// A phantom by its name; InputError for any other. With a seed, the patient of that number instead
-/// of the typical adult.
+/// A phantom by its name; throws InputError for any other name. With a seed, it is the patient of
+/// that number instead of the typical adult.
 Phantom make_phantom(const std::string& name,
                      bool has_metal,
                      std::optional<std::int64_t> anatomy_seed = {});

@@ -37,7 +37,7 @@ void add_arch(const Vertebra& v, BonePainter& bone) {
 }
 
 void add_spinous_process(const Vertebra& v, BonePainter& bone) {
-  // Long and steep on thoracic, broad and level on lumbar vertebrae.
+  // The process is long and steep on thoracic vertebrae, broad and level on lumbar ones.
   const double drop_mm = v.has_ribs() ? 16.0 : 7.0;
   const Vector3d root = v.center + Vector3d(0.0, v.half_depth_mm + 17.0, -5.0);
   const Vector3d tip = root + Vector3d(1.0 + v.tilt_mm, 25.0 * v.processes, -drop_mm * v.processes);
@@ -75,7 +75,7 @@ void add_osteophytes(const Vertebra& v, BonePainter& bone, std::vector<Solid>& s
   }
 }
 
-/// Of a body's tissue, what the patient's bones have.
+/// The density of a body's tissue in the patient's bones.
 int patients_hu(int hu, double cortical, double cancellous) {
   constexpr int kLowestBoneHu = 150;
   constexpr int kLowestCorticalHu = 400;
@@ -108,7 +108,7 @@ Solid shaped(Solid solid, const Habitus& habitus) {
   return solid;
 }
 
-/// At the patient's place, as large as before.
+/// The target at the patient's place, as large as before.
 RegistrationTarget shaped(const RegistrationTarget& target, const Habitus& habitus) {
   const CtBox& box = target.box_ct;
   const Vector3d half = 0.5 * (box.high_mm - box.low_mm);
@@ -129,7 +129,7 @@ Phantom shaped(Phantom phantom, const Anatomy& anatomy, const Habitus& habitus) 
   const double cortical = anatomy.between("cortical bone", 0.75, 1.15, 1.0);
   const double cancellous = anatomy.between("cancellous bone", 0.35, 1.45, 1.0);
   const double grain_mm = anatomy.between("trabecular scale", 2.0, 4.0, 3.0);
-  // Far enough for every patient to have a texture of its own.
+  // The shift is large enough for every patient to have a texture of its own.
   const Vector3d grain_shift_mm = anatomy.shift3("texture", 1e5);
   for (Solid& solid : phantom.solids) {
     solid = shaped(solid, habitus);
@@ -269,7 +269,7 @@ Vertebra varied(Vertebra v, const Anatomy& anatomy, int index) {
   v.shell_mm *= anatomy.shell();
   v.processes = anatomy.factor("processes", 0.08) * anatomy.factor("process", 0.06, index);
   v.tilt_mm = anatomy.shift("spinous tilt", 2.0, index);
-  // Some levels wear out more than others.
+  // Some levels wear more than others.
   v.arthrosis = anatomy.arthrosis() * anatomy.between("wear", 0.3, 1.0, 0.0, index);
   v.facets = 1.0 + 0.5 * v.arthrosis;
   v.beaks = static_cast<std::uint64_t>(anatomy.between("beaks", 0.0, 1e15, 0.0, index));

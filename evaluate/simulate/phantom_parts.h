@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What phantoms are built from, beyond single bodies.
+// What phantoms are built from, besides single bodies.
 #pragma once
 
 #include <cstdint>
@@ -28,10 +28,10 @@ struct PhantomOptions {
 
 std::vector<std::string> problems(const PhantomOptions& options);
 
-/// A bone that can be moved by itself.
+/// A bone that can be moved alone.
 struct PhantomBone {
-  std::string_view name;      ///< as its bodies have it
-  RegistrationTarget target;  ///< the bone, or what there is most of it to see
+  std::string_view name;      ///< as in its bodies
+  RegistrationTarget target;  ///< the bone, or where most of it is visible
 };
 
 /// A synthetic patient in DICOM LPS (left +x, back +y, head +z).
@@ -45,14 +45,14 @@ struct Phantom {
   [[nodiscard]] bool has_metal() const;  ///< denser than a scanner's range
 };
 
-/// The patient that a phantom of the typical adult becomes: bodies, volume and target by `habitus`,
-/// densities and textures by `anatomy`. \test ShapedPhantom.KeepsCapsulesJoined
+/// The patient into which a phantom of the typical adult is turned. `habitus` shapes bodies, volume
+/// and target; `anatomy` varies densities and textures. \test ShapedPhantom.KeepsCapsulesJoined
 Phantom shaped(Phantom phantom, const Anatomy& anatomy, const Habitus& habitus);
 
-/// Voxels of a phantom; metal at its full HU.
+/// Voxels of a phantom, with metal at its full HU.
 CtVolume sample_phantom(const Phantom& phantom, const PhantomOptions& options);
 
-/// Clips values above 3071 HU (metal) to 3071, as a scanner of 12 bits does.
+/// Clips values above 3071 HU (metal) to 3071, as a 12-bit scanner does.
 CtVolume with_scanner_range(const CtVolume& ct);
 
 /// HU of tissues, typical at 120 kV, and of titanium at the effective energy of the HU scale.
@@ -68,10 +68,10 @@ Solid ellipsoid(const Eigen::Vector3d& center,
                 int hu,
                 int texture_hu = 0);
 
-/// Axis along z.
+/// A cylinder with its axis along z.
 Solid elliptic_cylinder(const Eigen::Vector3d& center, const Eigen::Vector3d& half_sizes, int hu);
 
-/// The other half of a body that has a mirror image: x changes sign.
+/// The mirrored half of a body: x changes sign.
 Eigen::Vector3d mirrored(const Eigen::Vector3d& point, double side);
 
 /// Appends a bone as cortical shell and textured cancellous core. The shells of all parts of a bone
@@ -87,7 +87,7 @@ class BonePainter {
 
   void add(Solid part);
   void add_capsule(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double radius_mm);
-  /// Capsules from point to point.
+  /// Capsules from one point to the next.
   void add_chain(const std::vector<Eigen::Vector3d>& points, double radius_mm);
 
  private:
@@ -96,10 +96,10 @@ class BonePainter {
   std::vector<Solid> cores_;
 };
 
-/// Bodies from number `first` on move with `bone`.
+/// Makes bodies from number `first` on move with `bone`.
 void give_to_bone(std::string_view bone, std::vector<Solid>& solids, std::size_t first);
 
-/// Bubbles of bowel gas within a box; none in the typical adult, who has its own.
+/// Bubbles of bowel gas within a box. The typical adult gets none, because it has its own.
 void add_gas(const Anatomy& anatomy, const CtBox& box, std::vector<Solid>& solids);
 
 /// A vertebra: body with waist, pedicles, laminae, articular, transverse and spinous processes.
@@ -110,18 +110,19 @@ struct Vertebra {
   double half_depth_mm;
   double half_height_mm;
   double shell_mm = 1.6;
-  double processes = 1.0;   ///< length of transverse and spinous processes, times the typical
-  double facets = 1.0;      ///< radius of articular processes, times the typical
-  double tilt_mm = 0.0;     ///< sideways, of the spinous process's tip
+  double processes = 1.0;   ///< length of transverse and spinous processes, relative to the typical
+  double facets = 1.0;      ///< radius of articular processes, relative to the typical
+  double tilt_mm = 0.0;     ///< sideways shift of the spinous process's tip
   double arthrosis = 0.0;   ///< 0 to 1: beaks at the rims, dense end plates
-  std::uint64_t beaks = 0;  ///< key of their places
+  std::uint64_t beaks = 0;  ///< key of the beaks' places
 
   [[nodiscard]] bool has_ribs() const { return level >= 0; }
 };
 
 void add_vertebra(const Vertebra& v, std::vector<Solid>& solids);
 
-/// The vertebra as `anatomy` has it: width, depth, height, processes, wear. `index` keys its draws.
+/// The vertebra as `anatomy` varies it: width, depth, height, processes, wear. `index` keys its
+/// draws.
 Vertebra varied(Vertebra v, const Anatomy& anatomy, int index);
 
 }  // namespace af

@@ -8,7 +8,8 @@ namespace af {
 
 namespace {
 
-/// log(k!) by Stirling's series from 10 on (error below 1e-12); std::lgamma would write a global.
+/// log(k!), by Stirling's series from 10 on (error below 1e-12). std::lgamma would write to a
+/// global.
 double log_factorial(double k) {
   double shift = 0.0;
   double x = k + 1.0;

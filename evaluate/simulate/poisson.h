@@ -7,9 +7,9 @@
 
 namespace af {
 
-/// One draw from the Poisson distribution: products of uniforms below a mean of 10 (Knuth), above
-/// it Hoermann's transformed rejection PTRS (Insurance: Math. and Econ. 12:39, 1993), both exact.
-/// A mean that is not positive gives 0. \test Poisson.HasMeanAndVarianceOfItsParameter
+/// One draw from the Poisson distribution. Below a mean of 10 it uses products of uniforms (Knuth),
+/// above it Hoermann's transformed rejection PTRS (Insurance: Math. and Econ. 12:39, 1993). Both
+/// are exact. A mean that is not positive gives 0. \test Poisson.HasMeanAndVarianceOfItsParameter
 std::int64_t draw_poisson(double mean, HashRandom& random);
 
 }  // namespace af

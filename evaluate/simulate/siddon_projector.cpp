@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// A ray in voxel units: voxel i fills [i, i + 1) on its axis; t in mm along the ray.
+/// A ray in voxel units. Voxel i fills [i, i + 1) on its axis; t is in mm along the ray.
 struct VoxelRay {
   std::array<double, 3> origin;
   std::array<double, 3> direction;  ///< voxels per mm
@@ -53,7 +53,7 @@ std::optional<Interval> clip(const VoxelRay& ray, const std::array<int, 3>& size
   return inside;
 }
 
-/// Position of the walk from voxel to voxel.
+/// Position in the walk from voxel to voxel.
 struct Walk {
   std::array<int, 3> voxel;
   std::array<int, 3> step;         ///< -1, 0, 1

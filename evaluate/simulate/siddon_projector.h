@@ -9,9 +9,9 @@ namespace af {
 
 /// Exact radiological path through voxels that are boxes of constant attenuation (R. L. Siddon,
 /// Med. Phys. 12:252, 1985; incremental form of F. Jacobs et al., J. Comput. Inf. Technol. 6:89,
-/// 1998). Deliberately not the field's trilinear caster: X-rays must not come from the projector
-/// that is tested with them. A ray that runs exactly within a face of a voxel belongs to the voxel
-/// above it. Re-entrant. \test SiddonProjector.EqualsBruteForceBoxClipping
+/// 1998). It is deliberately not the field's trilinear caster: X-rays must not come from the
+/// projector that is tested with them. A ray that runs exactly within a face of a voxel belongs to
+/// the voxel above it. Re-entrant. \test SiddonProjector.EqualsBruteForceBoxClipping
 class SiddonProjector : public RayIntegrator {
  public:
   /// Both must outlive the projector.

@@ -26,7 +26,7 @@ void describe_patient(Fields& field, SimulateOptions& o) {
         "X-ray cameras: treatment-room, c-arm-12in or a rig.toml; every camera takes one X-ray");
   field.part(o.attenuation);
   field.at("water_mu_per_mm").help =
-      "What 0 HU stands for, 1/mm; fixes the effective energy of the HU scale";
+      "Attenuation of 0 HU, 1/mm; fixes the effective energy of the HU scale";
 }
 
 void describe_output(Fields& field, SimulateOptions& o) {
@@ -137,7 +137,7 @@ void append_bone_problems(const SimulateOptions& options, std::vector<std::strin
     found.push_back(unknown_name_text(bones, option, bone_of(options)));
 }
 
-/// Studies are refused whose target box breaks the rule of target_box_problem().
+/// Refuses studies whose target box breaks the rule of target_box_problem().
 void append_target_problems(const SimulateOptions& options, std::vector<std::string>& found) {
   for (const double value : options.center_ct_mm)
     if (!std::isfinite(value)) found.push_back("center_ct_mm must be finite");
@@ -224,11 +224,11 @@ void SimulateOptions::describe(Fields& field) {
       "ideal", is_ideal, "All effects off, float pixels; with --no-fiducials pure line integrals");
   field.start_group("");
   field.part(xray);
-  field.start_group("Stress (what real X-rays have)");
+  field.start_group("Stress (effects in real X-rays)");
   field.part(stress);
   field.start_group("Cone-beam scan (instead of a study)");
   field.part(cone_beam);
-  // Files of studies have them so.
+  // Files of studies use these names.
   field.name_like_options();
 }
 

@@ -39,12 +39,12 @@ struct SimulateOptions {
 
   std::vector<double> center_ct_mm;      ///< x, y, z
   std::vector<double> target_box_ct_mm;  ///< low x, y, z, high x, y, z
-  std::string target_bone;               ///< of the phantom
+  std::string target_bone;               ///< a bone of the phantom
   std::vector<int> roi_px;               ///< width, height
 
   double max_offset_rotation_deg = 5.0;
   double max_offset_translation_mm = 10.0;
-  std::string moved_bone;  ///< of the phantom
+  std::string moved_bone;  ///< a bone of the phantom
   bool omits_fiducials = false;
 
   AttenuationModel attenuation;
@@ -53,10 +53,10 @@ struct SimulateOptions {
   StressOptions stress;
   ConeBeamOptions cone_beam;
 
-  /// The imaging chain that is used: `xray`, or all its effects off when is_ideal, with the wanted
+  /// The imaging chain in use: `xray`, or all its effects off when is_ideal, with the requested
   /// stress.
   [[nodiscard]] XraySimulationOptions xray_in_force() const;
-  /// Whether X-rays are of a phantom's bodies, not of voxels.
+  /// Whether X-rays show a phantom's bodies instead of voxels.
   [[nodiscard]] bool images_bodies() const {
     return phantom_options.anatomy_seed.has_value() || !moved_bone.empty();
   }
@@ -67,7 +67,7 @@ struct SimulateOptions {
 
 std::vector<std::string> problems(const SimulateOptions& options);
 
-/// The phantom that is asked for; its target is the moved or target bone, if there is one.
+/// The requested phantom. Its target is the moved bone or the target bone, if there is one.
 Phantom phantom_of(const SimulateOptions& options);
 
 }  // namespace af::tools

@@ -32,8 +32,8 @@ std::string view_file(int view) {
   return "view-" + digits + ".mha";
 }
 
-/// The middle half of the detector: the scatter-to-primary ratio holds there, and predictions are
-/// judged there, which every view of the circle sees.
+/// The middle half of the detector, which every view of the circle sees. The scatter-to-primary
+/// ratio holds there, and predictions are judged there.
 RegionOfInterest middle_of(const CircularScan& scan) {
   const Eigen::Vector2i size = scan.size_px;
   return {size.x() / 4, size.y() / 4, size.x() / 2, size.y() / 2};
@@ -104,8 +104,8 @@ void write_circle(const SimulateOptions& options,
   }
 }
 
-/// Odd views' angles, as many before as behind the first view: there af-scan's even views, which it
-/// reconstructs from, are farthest.
+/// Angles of odd views, as many before the first view as after it. There af-scan's even views, from
+/// which it reconstructs, are farthest.
 std::vector<double> angles_between(const ConeBeamOptions& orbit) {
   std::vector<double> angles_rad;
   angles_rad.reserve(static_cast<std::size_t>(orbit.elevated_views));
@@ -126,8 +126,8 @@ StudyCase elevated_case(double elevation_deg, const fs::path& folder) {
   return result;
 }
 
-/// Line integrals without noise, 0 in the mean of the air beside the object, where af-scan takes
-/// its air level from, too: scatter brightens it.
+/// Line integrals without noise, 0 on average in the air beside the object. af-scan takes its air
+/// level there too, because scatter brightens it.
 Image2d noiseless_line_integrals(const XraySimulator& simulator,
                                  const DetectorOptions& detector,
                                  const CameraGeometry& camera,
@@ -148,7 +148,7 @@ Image2d noiseless_line_integrals(const XraySimulator& simulator,
   return image;
 }
 
-/// elevated.toml, its rig and its X-rays.
+/// Writes elevated.toml, its rig and its X-rays.
 void write_elevated(const SimulateOptions& options,
                     const XraySimulator& noiseless,
                     const DetectorOptions& detector,
@@ -210,7 +210,7 @@ CameraGeometry elevated_camera(const CircularScan& scan,
                                double elevation_deg,
                                const std::string& name) {
   CameraGeometry camera = scan_camera(scan, ScanCalibration::nominal(scan), angle_rad, name);
-  // The tangent of the circle at angle 0 is +x: a positive turn about it lowers the source.
+  // The tangent of the circle at angle 0 is +x, so a positive turn about it lowers the source.
   const Eigen::Vector3d tangent(std::cos(angle_rad), std::sin(angle_rad), 0.0);
   const Eigen::Matrix3d lift =
       Eigen::AngleAxisd(-elevation_deg * kRadPerDeg, tangent).toRotationMatrix();

@@ -46,7 +46,7 @@ namespace {
 /// Standard deviation of fiducial detections in column and row.
 constexpr double kFiducialSigmaPx = 0.2;
 
-/// A bone that X-rays show at another place than the CT.
+/// A bone that X-rays show at another place than the CT does.
 struct MovedBone {
   std::string name;
   RigidTransform rest_from_bone;
@@ -57,11 +57,11 @@ struct MovedBone {
 /// A case before its X-rays are taken: where the patient lies and what is to be found.
 struct SimulatedCase {
   StudyCase study_case;  ///< without file names; gold_room_from_ct is the true pose
-  /// Of all but the moved bone, whose pose gold_room_from_ct is.
+  /// Pose of everything but the moved bone, whose pose is gold_room_from_ct.
   RigidTransform rest_room_from_ct = RigidTransform::Identity();
   std::optional<MovedBone> moved_bone;
-  PoseParameters true_offset;            ///< of the true pose from the nominal one
-  CameraRig true_rig;                    ///< that takes the X-rays; the study's own may miss it
+  PoseParameters true_offset;            ///< of the true pose, relative to the nominal one
+  CameraRig true_rig;                    ///< takes the X-rays; the study's own rig may differ
   std::vector<SteelCylinder> fiducials;  ///< as the CT has them
   SteelBodies occluders;                 ///< in the X-rays only, besides the fiducials
   std::vector<std::vector<Eigen::Vector2d>> exact_fiducials_px;  ///< per view, without noise
@@ -138,7 +138,7 @@ void refuse_pins_off_detector(const CameraGeometry& camera,
                        "': choose another --center-ct-mm or rig, or --no-fiducials");
 }
 
-/// Seeds of one view's random numbers.
+/// Seed of one view's random numbers.
 std::uint64_t view_key(const std::string& case_name, const std::string& camera, const char* what) {
   return hash64(hash_name(case_name), hash_name(camera), hash_name(what));
 }
@@ -172,7 +172,7 @@ void add_fiducials(const SimulateOptions& options,
     simulated.fiducial_gold = gold_from_fiducials(views, study_case.fiducials_ct_mm);
 }
 
-/// The cameras as they truly stand.
+/// The cameras as they really are.
 CameraRig true_rig(const SimulateOptions& options,
                    const CameraRig& rig,
                    const StudyCase& study_case) {
@@ -188,7 +188,7 @@ CameraRig true_rig(const SimulateOptions& options,
   return result;
 }
 
-/// The pins where X-rays show them: with the moved bone.
+/// The pins where X-rays show them. They move with the moved bone.
 std::vector<SteelCylinder> imaged_fiducials(const SimulatedCase& simulated) {
   std::vector<SteelCylinder> pins = simulated.fiducials;
   if (!simulated.moved_bone) return pins;
@@ -287,7 +287,7 @@ std::string truth_text(const SimulatedCase& simulated) {
   return text;
 }
 
-/// Draws the true pose, and a wanted bone's motion against the rest.
+/// Draws the true pose and, if requested, a bone's motion relative to the rest.
 void draw_poses(const SimulateOptions& options, const PoseFrame& frame, SimulatedCase& simulated) {
   StudyCase& study_case = simulated.study_case;
   simulated.true_offset = drawn_offset(options, study_case.name);
@@ -378,14 +378,14 @@ SteelBodies all_steel(const SimulatedCase& simulated) {
   return steel;
 }
 
-/// The simulator of this case's X-rays from voxels; `volume` must outlive it.
+/// The simulator of this case's X-rays from voxels. `volume` must outlive it.
 XraySimulator voxel_simulator(const SimulateOptions& options,
                               const AttenuationVolume& volume,
                               const SimulatedCase& simulated) {
   return {volume, all_steel(simulated), options.xray_in_force()};
 }
 
-/// The simulator of this case's X-rays from a phantom's bodies themselves, with the wanted
+/// The simulator of this case's X-rays from a phantom's bodies themselves, with the requested
 /// motions.
 XraySimulator body_simulator(const SimulateOptions& options,
                              const Phantom& phantom,
@@ -399,7 +399,7 @@ XraySimulator body_simulator(const SimulateOptions& options,
           options.xray_in_force()};
 }
 
-/// What voxels show: the anatomy itself, or with the wanted non-rigid motion.
+/// What voxels show: the anatomy itself, or the anatomy with the requested non-rigid motion.
 CtVolume imaged_anatomy(const SimulateOptions& options,
                         const CtVolume& anatomy,
                         const SimulatedCase& simulated) {
@@ -407,7 +407,7 @@ CtVolume imaged_anatomy(const SimulateOptions& options,
   return motion ? motion->moved(anatomy) : anatomy;
 }
 
-/// What the study's CT is to be when it is not the input itself: a wanted degraded one.
+/// The study's CT if it differs from the input: a degraded one, on request.
 std::optional<CtVolume> degraded_study_ct(const SimulateOptions& options,
                                           const CtVolume& ct,
                                           const SimulatedCase& simulated) {
@@ -421,7 +421,7 @@ std::optional<CtVolume> degraded_study_ct(const SimulateOptions& options,
                      view_key(simulated.study_case.name, "", "ct noise"));
 }
 
-/// The X-ray's file into `folder`; its path goes to `view`.
+/// Writes the X-ray's file into `folder`, and its path into `view`.
 void write_xray(const SimulateOptions& options,
                 const Image2d& xray,
                 const CameraGeometry& camera,
@@ -453,8 +453,8 @@ void write_xray(const SimulateOptions& options,
   write(xray, view.xray, camera.pixel_spacing_mm.x(), camera.pixel_spacing_mm.y());
 }
 
-/// Takes the X-ray of every view and writes it with its preview into `folder`; fills in the file
-/// names.
+/// Takes the X-ray of every view, writes it with its preview into `folder`, and fills in the names
+/// of the files.
 void take_xrays(const SimulateOptions& options,
                 const XraySimulator& simulator,
                 const std::filesystem::path& folder,
@@ -481,7 +481,7 @@ void take_xrays(const SimulateOptions& options,
   }
 }
 
-/// study.toml, rig.toml, truth.toml, rig-true.toml where it differs, provenance.json and
+/// Writes study.toml, rig.toml, truth.toml, rig-true.toml if it differs, provenance.json and
 /// reproduce.sh.
 void write_study_files(const SimulateOptions& options,
                        const CameraRig& rig,
@@ -507,8 +507,8 @@ void write_study_files(const SimulateOptions& options,
   write_reproduce_script(folder, provenance);
 }
 
-/// A patient as X-rays and as the CT show them. The two differ where the CT clips metal; and X-rays
-/// of drawn anatomies and moved bones are of the bodies, not of voxels.
+/// A patient as X-rays and as the CT show them. The two differ where the CT clips metal. X-rays of
+/// drawn anatomies and moved bones show the bodies, not voxels.
 struct Patient {
   CtVolume anatomy;
   CtVolume ct;
@@ -617,7 +617,8 @@ std::string summary(const SimulatedCase& simulated, const std::filesystem::path&
 void run_simulate(const SimulateOptions& options,
                   const std::string& command_line,
                   const Communicator& world) {
-  if (!world.is_root()) return;  // the work is small; a launcher with several ranks does no harm
+  if (!world.is_root())
+    return;  // the work is small, and a launcher with several ranks does no harm
   throw_if_any(problems(options));
   const CameraRig rig = cameras(options, world);
   if (!options.ct.empty()) note_input(options.ct);
@@ -642,7 +643,7 @@ void run_simulate(const SimulateOptions& options,
   SimulatedCase simulated = imaged_case(options, imaged, rig, folder.path());
   inform(world, "Writing the study");
   simulated.study_case.ct = ct_of_study(options, imaged.ct, simulated, folder.path());
-  // A copy is in HU.
+  // The written copy is in HU.
   if (!options.ct.empty() && simulated.study_case.ct == std::filesystem::absolute(options.ct))
     simulated.study_case.ct_reading = options.ct_reading;
   write_study_files(options, rig, simulated, provenance, folder.path());

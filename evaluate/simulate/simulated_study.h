@@ -9,8 +9,8 @@
 namespace af::tools {
 
 /// Rank 0 works; the others return at once. Writes a study with a known answer, or a cone-beam
-/// scan. InputError when the target or a fiducial misses a detector, or a source lies inside the
-/// CT.
+/// scan. Throws InputError when the target or a fiducial misses a detector, or a source lies inside
+/// the CT.
 void run_simulate(const SimulateOptions& options,
                   const std::string& command_line,
                   const Communicator& world);

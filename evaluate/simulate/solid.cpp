@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::int16_t kAirHu = -1000;
 
-/// Convex bodies by whose chords most points of a row need not be asked whether they lie in a body.
+/// Convex bodies whose chords decide for most points of a row whether they lie in a body.
 struct RowFinder {
   explicit RowFinder(const Solid& solid) : wide(solid) {
     constexpr double kShare = 1e-6;  // far above rounding
@@ -120,24 +120,25 @@ double lattice_value(std::int64_t i, std::int64_t j, std::int64_t k) {
   return 2.0 * static_cast<double>(bits >> 11) * 0x1.0p-53 - 1.0;
 }
 
-/// Corners of the lattice's cells that a thread was in: it comes back to them, and neighbouring
-/// rays pass through the same ones.
+/// Corners of the lattice's cells that a thread visited. It returns to them, and neighbouring rays
+/// pass through the same ones.
 class LatticeCells {
  public:
   LatticeCells() : cells_(kCells) {}
 
   const std::array<double, 8>& corners_of(const std::array<std::int64_t, 3>& at) {
-    // Cells along a ray and beside it fall into different places.
+    // Cells along a ray and beside it get different places.
     const auto part = [&](std::size_t axis) { return static_cast<std::uint64_t>(at[axis]); };
     Cell& cell = cells_[(part(0) + 37 * part(1) + 331 * part(2)) % kCells];
-    // Without the call of std::memcmp() that std::array's comparison is.
+    // Compared by hand, because std::array's comparison calls std::memcmp().
     if (cell.at[0] != at[0] || cell.at[1] != at[1] || cell.at[2] != at[2]) fill(cell, at);
     return cell.corners;
   }
 
  private:
   struct Cell {
-    std::array<std::int64_t, 3> at{std::numeric_limits<std::int64_t>::min()};  ///< no point's
+    std::array<std::int64_t, 3> at{
+        std::numeric_limits<std::int64_t>::min()};  ///< no point has this
     std::array<double, 8> corners{};
   };
   static constexpr std::size_t kCells = 1024;  ///< 96 KiB
@@ -159,7 +160,7 @@ std::int64_t floor_of(double x) {
   return whole - static_cast<std::int64_t>(static_cast<double>(whole) > x);
 }
 
-/// Without std::lerp()'s branches, which make its ends exact.
+/// std::lerp() has branches that make its ends exact; this has none.
 double blend(double a, double b, double part) {
   return a + part * (b - a);
 }

@@ -10,8 +10,8 @@
 
 namespace af {
 
-/// A body of constant HU with an optional texture, in the ct frame (mm); later bodies replace
-/// earlier ones where they overlap.
+/// A body of constant HU with an optional texture, in the ct frame (mm). Where bodies overlap,
+/// later ones replace earlier ones.
 struct Solid {
   enum class Shape {
     Ellipsoid,
@@ -28,23 +28,24 @@ struct Solid {
   int hu = 0;
   int texture_hu = 0;  ///< amplitude of the texture added to hu
   double texture_scale_mm = 3.0;
-  Eigen::Vector3d texture_shift_mm = Eigen::Vector3d::Zero();      ///< other values at one point
-  Eigen::Matrix3d texture_rotation = Eigen::Matrix3d::Identity();  ///< of shifted points
-  std::string_view bone = {};  ///< that it moves with, of PhantomBone; empty: stays with the rest
+  Eigen::Vector3d texture_shift_mm =
+      Eigen::Vector3d::Zero();  ///< gives other values at the same point
+  Eigen::Matrix3d texture_rotation = Eigen::Matrix3d::Identity();  ///< applied to shifted points
+  std::string_view bone = {};  ///< PhantomBone with which it moves; empty: stays with the rest
 
   [[nodiscard]] bool contains(const Eigen::Vector3d& ct_point_mm) const;
   /// HU at a point of the body, with its texture.
   [[nodiscard]] int hu_at(const Eigen::Vector3d& ct_point_mm) const;
-  /// Half the sides of the box along the body's axes around its centre that holds it.
+  /// Half the sides of the box around its centre, along the body's axes, that holds it.
   [[nodiscard]] Eigen::Vector3d reach_mm() const;
   /// A box along the ct axes that holds the body.
   [[nodiscard]] CtBox bounds() const;
 };
 
-/// The body where a motion of the ct frame takes it, with its texture.
+/// The body after a motion of the ct frame, with its texture.
 Solid moved(Solid solid, const RigidTransform& motion);
 
-/// std::lround() without a call or a branch: X-rays and voxels round millions of HU.
+/// std::lround() without a call or a branch, because X-rays and voxels round millions of HU.
 inline int nearest_hu(double hu) {
   const int whole = static_cast<int>(hu);
   return whole + static_cast<int>(2.0 * (hu - whole));
@@ -58,9 +59,9 @@ Solid capsule_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double
 /// \test Texture.BlendsTheLatticeWhateverCameBefore
 double texture(const Eigen::Vector3d& ct_point_mm, double scale_mm);
 
-/// Bodies sampled on a grid with identity direction: every voxel is the mean HU of
-/// samples_per_axis^3 points, air (-1000 HU) elsewhere. The result does not depend on `threads`
-/// (0: as many as the hardware has).
+/// Bodies sampled on a grid with identity direction. Every voxel is the mean HU of
+/// samples_per_axis^3 points; elsewhere it is air (-1000 HU). The result does not depend on
+/// `threads` (0: as many as the hardware has).
 CtVolume sample_solids(const CtGrid& grid,
                        const std::vector<Solid>& solids,
                        int samples_per_axis,

@@ -48,7 +48,7 @@ std::optional<Chord> common(const std::optional<Chord>& a, const std::optional<C
   return both;
 }
 
-/// A capsule is convex: its chord reaches over those of its cylinder and its two balls.
+/// A capsule is convex, so its chord spans those of its cylinder and its two balls.
 std::optional<Chord> capsule_chord(const Solid& solid, const Vector3d& a, const Vector3d& b) {
   const double radius = solid.half_sizes_mm.x();
   const double half = solid.half_sizes_mm.z();
@@ -68,8 +68,8 @@ std::optional<Chord> capsule_chord(const Solid& solid, const Vector3d& a, const 
   return all;
 }
 
-/// Adds the parts of `outer` that the waist leaves, to 1e-6 mm; a gap of less than 1/24 of the
-/// chord may stay unseen. Only what lies within `wanted` is looked for.
+/// Adds the parts of `outer` that the waist leaves, to 1e-6 mm. A gap of less than 1/24 of the
+/// chord may go unseen. Looks only within `wanted`.
 void add_waist_chords(const Solid& solid,
                       const Vector3d& a,
                       const Vector3d& b,
@@ -101,7 +101,8 @@ void add_waist_chords(const Solid& solid,
   double last = outer.first_mm;
   bool was_inside = false;
   for (int i = first_sample; i <= last_sample; ++i) {
-    // The ends lie on the body's own flat ends, or on the cylinder around it: a little inwards.
+    // The ends lie on the body's own flat ends, or on the cylinder around it, so they are moved
+    // inwards a little.
     const double t = outer.first_mm + std::clamp(i * step, 1e-7, (kSamples - 1e-7) * step);
     const bool now_inside = is_inside(t);
     if (now_inside && !was_inside)
@@ -113,14 +114,14 @@ void add_waist_chords(const Solid& solid,
   if (was_inside && entry) found.add(*entry, outer.last_mm);
 }
 
-/// Whether a face of a box around the origin has all of the segment from a to b beyond it.
+/// Whether all of the segment from a to b lies beyond one face of a box around the origin.
 bool lies_beyond_a_face(const Vector3d& a, const Vector3d& b, const Vector3d& half_sizes) {
   return (a.array() > half_sizes.array() && b.array() > half_sizes.array()).any() ||
          (a.array() < -half_sizes.array() && b.array() < -half_sizes.array()).any();
 }
 
-/// Whether the body, seen in its own frame, holds all points within `distance_mm` of this one.
-/// Those points that it holds make up a convex body: what holds of two of them holds between.
+/// Whether the body, in its own frame, holds all points within `distance_mm` of this one. Those
+/// points that it holds form a convex body, so what holds for two of them holds between them.
 bool holds_around(const Solid& solid, const Vector3d& point, double distance_mm) {
   if (solid.shape == Solid::Shape::Capsule) {
     const double half = solid.half_sizes_mm.z();

@@ -17,12 +17,12 @@ using Eigen::Vector3d;
 namespace {
 
 constexpr std::size_t kRaysAtOnce = 16;
-/// Far above rounding: where a body is looked for beyond its surface.
+/// Distance beyond a body's surface within which it is looked for, far above rounding.
 constexpr double kMarginMm = 1e-6;
 
 }  // namespace
 
-/// The bodies around the present point of a ray; the one that was painted last is what is there.
+/// The bodies around the current point of a ray. What is there is the one that was painted last.
 class SolidProjector::OpenBodies {
  public:
   void start(const std::vector<int>& bodies) { open_ = bodies; }
@@ -131,7 +131,7 @@ void SolidProjector::add_span(const Piece& piece,
 std::vector<int> SolidProjector::candidates(const Vector3d& source_point,
                                             const Vector3d& direction,
                                             double sine) const {
-  // Motion takes no point of a ray farther from it than this.
+  // Motion takes no point of a ray farther from the ray than this.
   const double slack_mm = kMarginMm + (motion_ ? motion_->largest_mm() : 0.0);
   std::vector<int> found;
   for (std::size_t i = 0; i < balls_.size(); ++i) {
@@ -264,7 +264,7 @@ void SolidProjector::integrate_row(const Vector3d& source_point,
       find_way(source_point, direction, ways[i]);
     }
     sort_into(tubes(ways), candidates(source_point, axis, sine), bodies);
-    // Piece by piece, not ray by ray: what is read lies close together.
+    // The loop goes piece by piece, not ray by ray, so that what is read lies close together.
     for (std::size_t k = 0; k < bodies.size(); ++k)
       for (std::size_t i = 0; i < points.size(); ++i) {
         if (k >= ways[i].size()) continue;

@@ -12,12 +12,12 @@
 
 namespace af {
 
-/// Line integrals through bodies themselves, without voxels: the surfaces that a ray crosses in
-/// closed form (those of a waist by bisection to 1e-6 mm), between them the body that was painted
-/// last, textures by the midpoints of steps of at most 1.5 mm. So X-rays share no voxel grid with
-/// the CT that registers them. With a motion the ray is followed through the anatomy as a polyline,
-/// one piece every 8 mm. Ends at the faces of the phantom's volume. Which bodies are where is found
-/// for many neighbouring rays at once.
+/// Line integrals through bodies themselves, without voxels, so that X-rays share no voxel grid
+/// with the CT that registers them. The surfaces that a ray crosses are found in closed form (those
+/// of a waist by bisection to 1e-6 mm). Between them is the body that was painted last. Textures
+/// are sampled at the midpoints of steps of at most 1.5 mm. With a motion, the ray is followed
+/// through the anatomy as a polyline, one piece every 8 mm. It ends at the faces of the phantom's
+/// volume. Which bodies are where is found for many neighbouring rays at once.
 /// \test SolidProjector.EqualsClosedFormsOfSingleBodies
 class SolidProjector : public RayIntegrator {
  public:
@@ -37,7 +37,7 @@ class SolidProjector : public RayIntegrator {
     Eigen::Vector3d center_mm;
     double radius_mm;
   };
-  /// A surface of a body on a piece.
+  /// Where a piece crosses a body's surface.
   struct Crossing {
     double at_mm;
     int solid;
@@ -49,10 +49,10 @@ class SolidProjector : public RayIntegrator {
     Eigen::Vector3d origin;
     Eigen::Vector3d direction;  ///< unit
     double length_mm;           ///< in the anatomy
-    double stretch;             ///< mm of the X-ray's ray per mm of it
+    double stretch;             ///< mm of the X-ray's ray per mm of the anatomy
   };
   using Way = std::vector<Piece>;
-  /// All points within a distance of a segment: around the pieces of neighbouring rays.
+  /// All points within a distance of a segment. It surrounds the pieces of neighbouring rays.
   struct Tube {
     Eigen::Vector3d from;
     Eigen::Vector3d to;
@@ -60,7 +60,7 @@ class SolidProjector : public RayIntegrator {
 
     [[nodiscard]] Eigen::Vector3d middle() const { return 0.5 * (from + to); }
   };
-  /// Bodies of a tube, ascending: those that hold all of it, and others that may reach into it.
+  /// Bodies of a tube, ascending: those that hold all of it, and those that may reach into it.
   struct Bodies {
     std::vector<int> around;
     std::vector<int> near;
@@ -73,9 +73,9 @@ class SolidProjector : public RayIntegrator {
   [[nodiscard]] std::vector<int> candidates(const Eigen::Vector3d& source_point,
                                             const Eigen::Vector3d& direction,
                                             double sine) const;
-  /// Around the first, second ... pieces of all ways.
+  /// Tubes around the first, second ... pieces of all ways.
   [[nodiscard]] static std::vector<Tube> tubes(std::span<const Way> ways);
-  /// The bodies of each tube; no body that is not among `candidates` reaches into one.
+  /// Finds the bodies of each tube. Only bodies among `candidates` reach into one.
   void sort_into(const std::vector<Tube>& tubes,
                  const std::vector<int>& candidates,
                  std::vector<Bodies>& bodies) const;
@@ -83,7 +83,7 @@ class SolidProjector : public RayIntegrator {
   void find_crossings(const Piece& piece,
                       const std::vector<int>& near,
                       std::vector<Crossing>& crossings) const;
-  /// `open` holds the bodies around the piece, and at the end those at its end.
+  /// `open` holds the bodies around the piece, and afterwards those at its end.
   void add_piece(const Piece& piece,
                  const std::vector<Crossing>& crossings,
                  OpenBodies& open,

@@ -40,7 +40,8 @@ Vector3d spine_point(double z_mm) {
   return {3.5 * std::sin(z_mm / 70.0), 6.0 * std::sin(z_mm / 95.0), z_mm};
 }
 
-/// A vertebra that an old fracture has flattened: not the target. None: far from all levels.
+/// The vertebra that an old fracture has flattened, never the target. Without one, a number far
+/// from all levels.
 int fractured_level(const Anatomy& anatomy) {
   constexpr int kNone = 1000;
   if (!anatomy.has("old fracture", 0.12)) return kNone;
@@ -60,7 +61,7 @@ Vertebra vertebra_at(int level, const Anatomy& anatomy = {}) {
   return v;
 }
 
-/// Empty for one that the volume cuts.
+/// The name of a vertebra, empty when the volume cuts it.
 std::string_view vertebra_name(int level) {
   const auto index = static_cast<std::size_t>(level - kLowestWhole);
   return index < kWholeVertebrae.size() ? kWholeVertebrae[index] : std::string_view();
@@ -74,7 +75,7 @@ RegistrationTarget vertebra_target(int level) {
   return {center, {center - half, center + half}};
 }
 
-/// From the head down.
+/// All whole vertebrae, from the head down.
 std::vector<PhantomBone> whole_vertebrae() {
   std::vector<PhantomBone> bones;
   for (std::size_t i = kWholeVertebrae.size(); i-- > 0;)
@@ -91,7 +92,7 @@ void add_disc(int level_below, const Anatomy& anatomy, std::vector<Solid>& solid
                         kDiscHu));
 }
 
-/// Each vertebra has its part of the canal.
+/// Adds each vertebra's part of the canal.
 void add_canal(const Anatomy& anatomy, std::vector<Solid>& solids) {
   for (int level = -kVertebraeEachSide - 1; level <= kVertebraeEachSide + 1; ++level) {
     const Vertebra v = vertebra_at(level, anatomy);
@@ -102,8 +103,8 @@ void add_canal(const Anatomy& anatomy, std::vector<Solid>& solids) {
   }
 }
 
-/// Points along a rib: head at the body, tubercle at the transverse process, then around the
-/// chest wall and down.
+/// Points along a rib: head at the body, tubercle at the transverse process, then around the chest
+/// wall and down.
 std::vector<Vector3d> rib_points(const Vertebra& v, const Anatomy& anatomy, double side) {
   constexpr double kDegree = std::numbers::pi / 180.0;
   constexpr int kArcPoints = 24;
@@ -113,7 +114,7 @@ std::vector<Vector3d> rib_points(const Vertebra& v, const Anatomy& anatomy, doub
                          anatomy.factor("rib length", 0.06, index);
   const double total_drop_mm = (is_floating ? 45.0 : 75.0) * anatomy.factor("rib slope", 0.15) *
                                anatomy.factor("rib's slope", 0.05, index);
-  // The spine sits deeper than the chest wall's back: the ribs first run backwards, then around.
+  // The spine sits deeper than the chest wall's back, so the ribs first run backwards, then around.
   const double half_width = kTorsoHalfWidthMm - 23.0 - 3.0 * (v.level == 4 ? 1 : 0);
   const double half_depth = kTorsoHalfDepthMm - 20.0;
   std::vector<Vector3d> points{
@@ -222,7 +223,7 @@ void add_screws_and_rods(const Anatomy& anatomy,
   }
 }
 
-/// Implants that the typical adult lacks; what they are goes to `findings`.
+/// Adds implants that the typical adult lacks. `findings` says what they are.
 void add_drawn_implants(const Anatomy& anatomy,
                         bool has_metal,
                         std::vector<Solid>& solids,
@@ -263,7 +264,7 @@ void add_anatomy(const Anatomy& anatomy, std::vector<Solid>& solids) {
   add_soft_tissue(anatomy, solids);
   add_calcifications(anatomy, solids);
   add_ribs(anatomy, solids);
-  // One more vertebra at each end: the volume cuts through them, as a scan does.
+  // There is one more vertebra at each end, which the volume cuts as a scan does.
   for (int level = -kVertebraeEachSide - 1; level <= kVertebraeEachSide; ++level)
     add_disc(level, anatomy, solids);
   for (int level = -kVertebraeEachSide - 1; level <= kVertebraeEachSide + 1; ++level) {

@@ -14,7 +14,7 @@ namespace af {
 namespace {
 
 constexpr double kHeelRamp = 0.25;         // share of the beam lost or gained at the edges
-constexpr double kScatterToPrimary = 2.0;  // of scatter that the open beam adds to
+constexpr double kScatterToPrimary = 2.0;  // including scatter from the open beam
 constexpr double kPhotonsPerPixel = 2e4;   // in the open beam
 
 struct NamedStress {
@@ -38,7 +38,7 @@ const char* name_of(Stress effect) {
       ->name;
 }
 
-/// Joins text and numbers, numbers as short as they are.
+/// Joins text and numbers. Numbers are as short as possible.
 template <typename... Parts>
 std::string sentence(const Parts&... parts) {
   std::ostringstream text;

@@ -18,12 +18,12 @@ std::vector<std::string> stress_names();
 /// RMS over the target box.
 inline constexpr double kCalibrationErrorPx = 0.2;
 
-/// Which effects are wanted. Their strengths are the defaults of what makes them.
+/// The requested effects. Their strengths are the defaults of what makes them.
 struct StressOptions {
-  std::vector<std::string> names;  ///< of stress_names()
+  std::vector<std::string> names;  ///< from stress_names()
 
   [[nodiscard]] bool has(Stress effect) const;
-  /// The detector with the wanted ones of ramp, scatter and noise.
+  /// The detector with the requested ones of ramp, scatter and noise.
   [[nodiscard]] DetectorOptions detector(DetectorOptions detector) const;
 
   void describe(Fields& field);
@@ -35,7 +35,7 @@ struct StressDescription {
   std::string text;
 };
 
-/// The wanted effects in the order of Stress.
+/// The requested effects in the order of Stress.
 std::vector<StressDescription> descriptions(const StressOptions& options);
 
 }  // namespace af

@@ -25,8 +25,7 @@ struct XraySimulationOptions {
   DetectorOptions detector;
   int threads = 0;  ///< 0: as many as the hardware has; results do not depend on it
 
-  /// One energy, no scatter, noise, blur or quantisation: Beer and Lambert's
-  /// law.
+  /// One energy, no scatter, noise, blur or quantisation: Beer and Lambert's law.
   static XraySimulationOptions ideal();
 
   void describe(Fields& field);
@@ -34,9 +33,9 @@ struct XraySimulationOptions {
 
 std::vector<std::string> problems(const XraySimulationOptions& options);
 
-/// Makes X-rays of a CT, or of a phantom, with steel bodies. Steel adds to the tissue along a ray;
-/// the tissue that it would displace (at most 0.04 of the steel's own attenuation) is not taken
-/// away.
+/// Makes X-rays of a CT, or of a phantom, with steel bodies. Steel adds to the tissue along a ray.
+/// The tissue that it would displace (at most 0.04 of the steel's own attenuation) is not
+/// subtracted.
 class XraySimulator {
  public:
   /// `volume` must outlive the simulator.
@@ -44,7 +43,8 @@ class XraySimulator {
                 SteelBodies steel,
                 const XraySimulationOptions& options);
 
-  /// X-rays of a phantom's bodies themselves, at rest or moved: no voxels. Tissue follows `model`.
+  /// X-rays of a phantom's bodies themselves, at rest or moved, without voxels. Tissue follows
+  /// `model`.
   XraySimulator(const Phantom& phantom,
                 std::optional<SmoothMotion> motion,
                 const AttenuationModel& model,
@@ -56,8 +56,8 @@ class XraySimulator {
                                       const RigidTransform& room_from_ct,
                                       const ProgressCallback& progress = {}) const;
 
-  /// The X-ray as grey values, bright where nothing attenuates; `view.roi` is where the
-  /// scatter-to-primary ratio holds. Noise is keyed by (seed, key, pixel).
+  /// The X-ray as grey values, bright where nothing attenuates. The scatter-to-primary ratio holds
+  /// within `view.roi`. Noise is keyed by (seed, key, pixel).
   [[nodiscard]] Image2d xray(const View& view,
                              const RigidTransform& room_from_ct,
                              std::uint64_t seed,

@@ -16,8 +16,8 @@ namespace af::evaluation {
 namespace {
 
 // A pure rotation of magnitude m moves the target by m times its mean distance from the rotation's
-// axis over its RMS distance from the centre: 0.7 to 0.8 for boxes of usual shape. So magnitudes up
-// to 1.5 times the last interval's end reach that end in every direction.
+// axis, divided by its RMS distance from the centre: 0.7 to 0.8 for boxes of usual shape.
+// Magnitudes up to 1.5 times the last interval's end therefore reach that end in every direction.
 constexpr double kMagnitudeOverTre = 1.5;
 
 // Keys of the streams of random numbers, so that no two uses share one.
@@ -34,7 +34,7 @@ std::uint64_t most_draws(const StartOptions& options) {
 
 /// A draw that may become a start.
 struct Candidate {
-  std::uint64_t order = 0;  ///< random: those of low order are taken
+  std::uint64_t order = 0;  ///< random; those of low order are taken
   std::uint64_t draw_index = 0;
 };
 
@@ -46,7 +46,7 @@ void in_parts(std::uint64_t count, const Function& function) {
     function(IndexRange{first, std::min(kAtOnce, count - first)});
 }
 
-/// TREs and intervals of starts whose poses are set.
+/// Sets TREs and intervals of starts whose poses are set.
 void measure(StartMeasures& measures, std::span<PerturbedStart> starts) {
   std::vector<RigidTransform> poses;
   in_parts(starts.size(), [&](const IndexRange& part) {
@@ -62,7 +62,7 @@ void measure(StartMeasures& measures, std::span<PerturbedStart> starts) {
   });
 }
 
-/// Picks as many as wanted at random and appends them by draw index.
+/// Picks the wanted number at random, and appends them by draw index.
 void pick(StartMeasures& measures,
           std::vector<Candidate> candidates,
           std::vector<PerturbedStart>& starts) {
@@ -180,7 +180,7 @@ PoseParameters StartMeasures::stratified_draw(std::uint64_t draw_index) const {
                            draw_index);
 }
 
-/// Most draws need no mean over all points: bounds of their TRE suffice.
+/// Most draws need no mean over all points, because bounds of their TRE suffice.
 int StartMeasures::interval_of_draw(const RigidTransform& room_from_ct) const {
   for (const TreBounder& bounder : bounders_) {
     const TreBounds bounds = bounder.bounds(room_from_ct, frame_.gold_room_from_ct);
@@ -214,8 +214,8 @@ std::vector<double> StartMeasures::tres_mm(std::span<const RigidTransform> room_
   return tres_mm;
 }
 
-/// Scales the parameters until the initial TRE is `tre_mm`; returns what it is then. TRE is a mean
-/// of distances that grow with the scale almost in proportion, so each step gains some digits.
+/// Scales the parameters until the initial TRE is `tre_mm`, and returns what it is then. TRE is a
+/// mean of distances that grow with the scale almost in proportion, so each step gains some digits.
 double StartMeasures::scale_to_tre(double tre_mm, PoseParameters& parameters) const {
   constexpr double kToleranceMm = 1e-9;
   constexpr int kMostSteps = 50;
@@ -259,7 +259,7 @@ double StartMeasures::tre_mm(const RigidTransform& room_from_ct) const {
   return mean_tre_mm(room_from_ct, frame_.gold_room_from_ct, points_ct_mm_);
 }
 
-/// A pose so far from gold along a direction, brought back into the motion range.
+/// The pose with the wanted TRE along a direction, brought back into the motion range.
 RigidTransform StartMeasures::pose_within_range(const PoseParameters& direction,
                                                 double size_mm) const {
   // A search that starts at the wall could not try poses on both sides of its start.
@@ -280,7 +280,7 @@ UniformStart StartMeasures::draw_within_range(std::uint64_t index) const {
   const auto interval = index / static_cast<std::uint64_t>(options_.starts_per_interval);
   const double wanted_mm =
       (static_cast<double>(interval) + random.uniform()) * options_.interval_width_mm;
-  // Where the range holds even the rotations back, translations of this size reach every TRE.
+  // Where the range restricts even the rotations, translations of this size reach every TRE.
   const double largest_mm = 4.0 * wanted_mm;
   UniformStart start;
   start.initial_tre_mm = wanted_mm;
@@ -290,8 +290,8 @@ UniformStart StartMeasures::draw_within_range(std::uint64_t index) const {
     normals.normalize();
     const PoseParameters direction{normals.head<3>(), normals.tail<3>()};
     if (tre_mm(pose_within_range(direction, largest_mm)) < wanted_mm) continue;
-    // TRE is continuous along the way, which begins at or near gold: halving finds a place of the
-    // wanted TRE, to 60 bits.
+    // TRE is continuous along the way, which begins at or near gold. Halving therefore finds a
+    // place of the wanted TRE, to 60 bits.
     double below = 0.0;
     double above = largest_mm;
     constexpr int kHalvings = 60;
@@ -301,7 +301,7 @@ UniformStart StartMeasures::draw_within_range(std::uint64_t index) const {
     }
     const RigidTransform pose = pose_within_range(direction, below);
     const double found_mm = tre_mm(pose);
-    // There is no continuous way near a gold pose beside the wall.
+    // Near a gold pose beside the wall, no way is continuous.
     constexpr double kToleranceMm = 1e-6;
     if (std::abs(found_mm - wanted_mm) > kToleranceMm || !is_admissible_(pose)) continue;
     start.parameters = parameters_from_pose(frame_.pose_frame(), pose);
@@ -335,7 +335,7 @@ StratifiedStarts stratified_starts(StartMeasures& measures) {
   while (full_intervals < by_interval.size()) {
     if (result.draws == most_draws(options)) throw_too_empty(by_interval, options, result);
     if (judged == verdicts.size()) {
-      // Draws only a few more than are needed; the last of them may be judged in vain.
+      // Only a few more than needed are drawn. The last of them may be judged in vain.
       const std::uint64_t needed =
           std::max<std::uint64_t>(by_interval.size() * wanted, result.draws);
       verdicts =
@@ -368,7 +368,7 @@ StratifiedStarts stratified_starts(StartMeasures& measures) {
 
 namespace {
 
-/// Starts that are drawn one by one, each until it is admissible.
+/// Draws starts one by one, each until it is admissible.
 StratifiedStarts starts_one_by_one(
     StartMeasures& measures,
     const std::string& refusal,

@@ -16,7 +16,7 @@
 
 namespace af::evaluation {
 
-/// How starts are drawn: as many as wanted in every interval of initial TRE (Sec. IV-B: eight
+/// How starts are drawn: the same number in every interval of initial TRE (Sec. IV-B: eight
 /// intervals of 2 mm, 30 starts each).
 struct StartOptions {
   int intervals = 8;
@@ -27,7 +27,7 @@ struct StartOptions {
 
 std::vector<std::string> problems(const StartOptions& options);
 
-/// What the starts of one case are relative to.
+/// The frame of the starts of one case.
 struct StartFrame {
   std::string case_name;
   RigidTransform gold_room_from_ct = RigidTransform::Identity();
@@ -40,9 +40,9 @@ struct StartFrame {
   }
 };
 
-/// Draw `index` of a case: a direction uniform in the six parameters, rotations scaled by the
-/// target box's RMS radius about c_roi, and a magnitude uniform in [0, largest_magnitude_mm).
-/// Depends on (seed, case name, index) alone.
+/// Draw `index` of a case: a direction uniform in the six parameters, with rotations scaled by the
+/// target box's RMS radius about c_roi, and a magnitude uniform in [0, largest_magnitude_mm). It
+/// depends only on (seed, case name, index).
 PoseParameters draw_perturbation(const StartFrame& frame,
                                  double largest_magnitude_mm,
                                  std::uint64_t seed,
@@ -54,18 +54,19 @@ struct PerturbedStart {
   PoseParameters parameters;  ///< relative to gold: StartFrame::pose_frame()
   RigidTransform room_from_ct = RigidTransform::Identity();
   double initial_tre_mm = 0.0;
-  /// Its place in the random order of the starts of its interval, from 0. A smaller study takes the
-  /// starts of low rank, which are a random part of this one.
+  /// The start's place in the random order of its interval's starts, from 0. A smaller study takes
+  /// the starts of low rank, which are a random part of this one.
   int rank_in_interval = 0;
 };
 
-/// Which part of a start is rotation: the square of its size in mm, angles times the target box's
-/// RMS radius, over that of rotation and translation together. 0: a pure translation; 1: a pure
-/// rotation; NaN when nothing moves. Directions uniform in the six parameters have 1/2 on average.
+/// The share of rotation in a start: the square of its size in mm (angles times the target box's
+/// RMS radius), divided by that of rotation and translation together. It is 0 for a pure
+/// translation, 1 for a pure rotation, and NaN when nothing moves. Directions uniform in the six
+/// parameters have 1/2 on average.
 /// \test RotationShare.IsOneHalfWhereNothingIsRefused
 double rotation_share(const PoseParameters& parameters, double rms_radius_mm);
 
-/// The motion range of a field: what its poses are relative to, and how far they may lie from it.
+/// The motion range of a field: the frame of its poses, and how far they may lie from it.
 struct StartLimit {
   PoseFrame frame;
   MotionRange range;
@@ -82,8 +83,8 @@ struct IndexRange {
 
 /// Where a draw of stratified_starts() falls.
 struct DrawVerdict {
-  int interval = 0;           ///< the number of intervals or more: beyond the last
-  bool is_admissible = true;  ///< beyond the last: not asked
+  int interval = 0;           ///< the number of intervals or more: beyond the last one
+  bool is_admissible = true;  ///< not asked beyond the last one
 };
 
 /// A start of uniform_starts() or starts_within_range().
@@ -93,14 +94,14 @@ struct UniformStart {
   std::uint64_t refused = 0;  ///< draws before it that were not admissible
 
   static constexpr std::uint64_t kMostDraws = 1000;
-  /// No draw was admissible.
+  /// Whether no draw was admissible.
   [[nodiscard]] bool is_exhausted() const { return refused == kMostDraws; }
 };
 
-/// The computations on single draws or poses.
+/// Computes single draws or poses.
 class StartMeasures {
  public:
-  /// The points must outlive it. Throws InputError for options that are not valid.
+  /// The points must outlive it. Throws InputError for invalid options.
   StartMeasures(StartFrame frame,
                 const StartOptions& options,
                 std::span<const Eigen::Vector3d> target_points_ct_mm,
@@ -116,16 +117,16 @@ class StartMeasures {
     return options_.intervals * options_.interval_width_mm;
   }
 
-  /// From 0.
+  /// Counts from 0.
   [[nodiscard]] int interval_of(double initial_tre_mm) const;
   /// Draw `draw_index` of stratified_starts().
   [[nodiscard]] PoseParameters stratified_draw(std::uint64_t draw_index) const;
 
-  /// In order.
+  /// Verdicts in the order of the draws.
   std::vector<DrawVerdict> judge_draws(IndexRange draws);
   /// Mean TREs against the gold pose, in the order of the poses.
   std::vector<double> tres_mm(std::span<const RigidTransform> room_from_ct);
-  /// In order. When a start is exhausted, nothing is drawn after it.
+  /// Starts in order. When one is exhausted, nothing is drawn after it.
   std::vector<UniformStart> draw_uniform(IndexRange starts);
   /// The same for starts_within_range(), which needs a limit.
   std::vector<UniformStart> draw_within_range(IndexRange starts);
@@ -152,42 +153,42 @@ struct StratifiedStarts {
   std::uint64_t draws = 0;
   std::uint64_t inadmissible_draws = 0;  ///< refused by the predicate
   std::uint64_t draws_beyond = 0;        ///< initial TRE past the last interval
-  /// Draws that the predicate refused, by the interval that they would have been in; draws
-  /// for intervals that are already full count, too.
+  /// How many draws the predicate refused, by the interval in which they would have been. Draws for
+  /// intervals that are already full count too.
   std::vector<std::uint64_t> inadmissible_per_interval;
-  /// All draws by the interval that they would have been in, refused or not; empty when the starts
+  /// All draws by the interval in which they would have been, refused or not. Empty when the starts
   /// were not drawn.
   std::vector<std::uint64_t> draws_per_interval;
-  /// Mean rotation_share() of the starts; NaN for an interval without any. Draws that a field's
-  /// range refuses are mostly rotations: far starts are then mostly translations.
+  /// Mean rotation_share() of the starts; NaN for an interval without any. The draws that a field's
+  /// range refuses are mostly rotations, so far starts are mostly translations.
   std::vector<double> rotation_share_per_interval;
 };
 
-/// The paper's rule: draws until every interval has enough, then picks at random that many in each.
-/// Throws InputError when an interval stays too empty after 1000 draws per wanted start (at least
-/// 100000): what is admissible leaves too little room there.
+/// The paper's rule: draws until every interval has enough, then picks the stated number in each at
+/// random. Throws InputError when an interval has too few after 1000 draws per wanted start (at
+/// least 100000), because what is admissible leaves too little room there.
 /// \test PerturbedStarts.FillEveryIntervalWithExactlyTheStatedCount
 StratifiedStarts stratified_starts(StartMeasures& measures);
 
-/// As many starts in all, with initial TREs uniform over all intervals together. Start i has a TRE
+/// The same total number, with initial TREs uniform over all intervals together. Start i has a TRE
 /// of its own, drawn by (seed, case name, i). Its direction is drawn again until it is admissible,
 /// so the distribution stays uniform. Throws InputError after 1000 refusals of one start.
 /// \test PerturbedStarts.UniformInTreHaveThatDistribution
 StratifiedStarts uniform_starts(StartMeasures& measures);
 
 /// As many starts in each interval as stratified_starts() gives, inside the measures' limit by
-/// design: a direction uniform in the six parameters as there, and a TRE uniform in the interval.
-/// The start moves along the direction; each of the limit's six parameters stops at 98 % of its
-/// range, and the others continue until the TRE is reached. So a start keeps as much rotation as
-/// the range allows, and translation provides the rest. A direction that cannot reach the TRE
-/// within the range is drawn again and counts as refused, as does one that the predicate refuses
-/// (another field's range). InputError without a limit, for a gold pose outside, and after 1000
-/// refusals of one start; `field` names the rule there. \test
-/// PerturbedStarts.WithinRangeLieInsideByDesign
+/// design. A start has a direction uniform in the six parameters, as there, and a TRE uniform in
+/// the interval. It moves along the direction. Each of the limit's six parameters stops at 98 % of
+/// its range, and the others continue until the TRE is reached. A start thus keeps as much rotation
+/// as the range allows, and translation provides the rest.
+/// A direction that cannot reach the TRE within the range is drawn again and counts as refused. So
+/// does one that the predicate refuses (the range of another field). Throws InputError without a
+/// limit, for a gold pose outside, and after 1000 refusals of one start; `field` names the rule
+/// there. \test PerturbedStarts.WithinRangeLieInsideByDesign
 StratifiedStarts starts_within_range(StartMeasures& measures,
                                      const std::string& field = "start_rule");
 
-/// The starts at given poses, in their order; intervals may lie beyond the last one.
+/// The starts at given poses, in their order. Intervals may lie beyond the last one.
 StratifiedStarts starts_at(StartMeasures& measures, std::span<const RigidTransform> poses);
 
 }  // namespace af::evaluation

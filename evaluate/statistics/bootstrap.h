@@ -11,7 +11,7 @@
 
 namespace af::evaluation {
 
-/// With fewer cases the percentile interval is too narrow: docs/errors.md says how often it
+/// With fewer cases the percentile interval is too narrow. docs/errors.md says how often it
 /// contains the truth of simulated studies. \test IntervalCoverage.OfTheBootstrapGrowsWithTheCases
 inline constexpr std::size_t kEnoughCases = 30;
 
@@ -29,8 +29,9 @@ struct CaseBootstrap {
 inline constexpr std::size_t kBootstrapReplicates = 2000;
 
 /// 95 % percentile bootstrap interval (Efron 1979) of `statistic` over `cases` cases, drawn with
-/// replacement: starts of one patient share a CT and its X-rays, so patients are what is sampled.
-/// The statistic is given the drawn case numbers. Depends on (cases, seed, replicates) alone.
+/// replacement. Patients are the unit that is sampled, because starts of one patient share a CT and
+/// its X-rays. The statistic is given the drawn case numbers. Depends only on (cases, seed,
+/// replicates).
 CaseBootstrap bootstrap_over_cases(
     std::size_t cases,
     const std::function<double(std::span<const std::size_t> drawn)>& statistic,
@@ -45,9 +46,9 @@ struct CaseMean {
 
 /// A mean over cases with both kinds of 95 % intervals.
 struct MeanOverCases {
-  double value = 0.0;       ///< of all terms together
-  CaseBootstrap bootstrap;  ///< of it
-  /// Of the mean of the cases' own means, in which every case has the same weight.
+  double value = 0.0;       ///< over all terms together
+  CaseBootstrap bootstrap;  ///< of that value
+  /// Interval of the mean of the cases' own means, in which every case has the same weight.
   MeanInterval student;
 };
 

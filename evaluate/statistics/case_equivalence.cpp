@@ -11,12 +11,12 @@
 namespace af::evaluation {
 namespace {
 
-/// P(a mean at least as far below the margin), were the true mean at the margin.
+/// P(a mean at least this far below the margin) if the true mean were at the margin.
 double below_margin_p(std::span<const double> values, double mean, double margin) {
   if (values.size() < 2) return kNan;
   const auto n = static_cast<double>(values.size());
   const double standard_error = standard_deviation_of(values, mean) / std::sqrt(n);
-  // Equal values have a spread of rounding, which must not be taken for one of patients.
+  // Equal values have a spread of rounding, which must not count as one of patients.
   constexpr double kRounding = 1e-12;
   if (!(standard_error > kRounding * mean)) return mean < margin ? 0.0 : 1.0;
   const boost::math::students_t distribution(n - 1.0);
@@ -27,12 +27,12 @@ double below_margin_p(std::span<const double> values, double mean, double margin
 
 bool CaseEquivalence::is_shown() const {
   if (!has_enough_cases()) return false;
-  // Student's interval does not exist where all cases are alike; the bootstrap's is then a point.
+  // Student's interval does not exist where all cases are alike. The bootstrap's is then a point.
   const bool is_student_below = std::isnan(student.high) ? p == 0.0 : student.high < margin;
   return is_student_below && bootstrap.high < margin;
 }
 
-// A margin is no whole number, and a seed is given first wherever numbers are drawn.
+// A margin is no whole number, and a seed comes first wherever numbers are drawn.
 // NOLINTBEGIN(bugprone-easily-swappable-parameters)
 CaseEquivalence equivalence_over_cases(std::span<const double> case_means,
                                        double margin,

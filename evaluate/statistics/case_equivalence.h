@@ -10,20 +10,20 @@
 
 namespace af::evaluation {
 
-/// With fewer patients, equivalence is neither claimed nor denied: docs/errors.md says how often
+/// With fewer patients, equivalence is neither claimed nor denied. docs/errors.md says how often
 /// studies of this size claim it wrongly. \test CaseEquivalence.IsRarelyClaimedWrongly
 inline constexpr std::size_t kEnoughCasesForEquivalence = 10;
 
-/// Whether the mean over patients of a distance (never negative: opposite errors do not cancel) is
-/// below a margin.
+/// Whether the mean over patients of a distance is below a margin. A distance is never negative, so
+/// opposite errors do not cancel.
 struct CaseEquivalence {
   std::size_t cases = 0;
   double mean = 0.0;        ///< of the cases' own means; NaN without cases
   MeanInterval student;     ///< 95 %, over the cases' own means
   CaseBootstrap bootstrap;  ///< 95 %, the same by resampling of cases
   double margin = 0.0;
-  /// One-sided Student's test over cases of a mean at or above the margin; NaN for fewer than two
-  /// cases. Cases that are all alike have no spread: p is then 0 or 1.
+  /// One-sided Student's test over cases of a mean at or above the margin. NaN for fewer than two
+  /// cases. Cases that are all alike have no spread, and p is then 0 or 1.
   double p = 0.0;
 
   [[nodiscard]] bool has_enough_cases() const { return cases >= kEnoughCasesForEquivalence; }
@@ -32,7 +32,7 @@ struct CaseEquivalence {
 };
 
 /// `case_means` has one value per case: the mean over its own starts. Throws InputError when a
-/// value is not finite or negative, or the margin not positive.
+/// value is not finite or is negative, or the margin is not positive.
 /// \test CaseEquivalence.OfHandComputedCases
 CaseEquivalence equivalence_over_cases(std::span<const double> case_means,
                                        double margin,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which patient a case is of: the unit that is sampled.
+// Which patient a case belongs to. The patient is the unit that is sampled.
 #pragma once
 
 #include <cstddef>

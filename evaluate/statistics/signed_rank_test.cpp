@@ -16,7 +16,7 @@ namespace {
 constexpr std::size_t kMostExactPairs = 200;
 
 struct SignedRanks {
-  std::vector<std::size_t> doubled;  ///< twice the mean rank: whole numbers also with ties
+  std::vector<std::size_t> doubled;  ///< twice the mean rank, a whole number even with ties
   std::size_t doubled_positive = 0;
   double tie_correction = 0.0;  ///< sum of t^3 - t over groups of t equal sizes
 };
@@ -33,7 +33,8 @@ SignedRanks ranks_of(std::vector<double> differences) {
     const auto ties = static_cast<double>(end - first);
     ranks.tie_correction += ties * ties * ties - ties;
     for (; first < end; ++first) {
-      // The ranks from `end - ties` + 1 to `end` share their mean; twice that is their sum's ends.
+      // The ranks from `end - ties` + 1 to `end` share their mean. Twice that is the sum of the
+      // first and the last.
       ranks.doubled.push_back(2 * end - static_cast<std::size_t>(ties) + 1);
       if (differences[first] > 0.0) ranks.doubled_positive += ranks.doubled.back();
     }

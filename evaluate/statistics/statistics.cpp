@@ -70,7 +70,7 @@ double equivalence_power(std::size_t pairs, double standard_deviation, double ma
   const auto n = static_cast<double>(pairs);
   const double noncentrality = margin * std::sqrt(n) / standard_deviation;
   // Far beyond any quantile at 5 % of two or more pairs, where the series of the noncentral
-  // distribution need not converge any more (also for no spread at all).
+  // distribution may no longer converge (also without any spread).
   constexpr double kCertain = 50.0;
   if (!(noncentrality < kCertain)) return 1.0;
   const double critical = boost::math::quantile(boost::math::students_t(n - 1.0), 0.95);

@@ -30,25 +30,25 @@ struct PairedComparison {
                                ///< difference lies within +-margin at 95 % confidence
   double low_90 = 0.0;         ///< 90 % confidence interval of the mean difference, the one that
   double high_90 = 0.0;        ///< corresponds to the two one-sided tests at 5 %
-  double equivalence_power = 0.0;  ///< see equivalence_power(), with the spread that was observed
+  double equivalence_power = 0.0;  ///< see equivalence_power(), with the observed spread
 };
 
 /// Paired t-test and equivalence test. Throws InputError for unequal sizes, fewer than two pairs,
-/// values that are not finite or a margin that is not positive. Equal differences everywhere have
-/// no spread: p is then 0 or 1.
+/// values that are not finite or a margin that is not positive. Differences that are all equal have
+/// no spread, and p is then 0 or 1.
 PairedComparison compare_paired(std::span<const double> first,
                                 std::span<const double> second,
                                 double margin);
 
 /// Probability that two one-sided tests at 5 % show equivalence within +-margin when the true mean
-/// difference is zero, for so many pairs whose differences have this standard deviation:
-/// max(0, 1 - 2 F(t)) with F the noncentral t distribution of pairs - 1 degrees of freedom and
-/// noncentrality margin / (sd / sqrt(pairs)), t the 95 % quantile of Student's (the usual
+/// difference is zero, for this many pairs whose differences have this standard deviation. It is
+/// max(0, 1 - 2 F(t)), where F is the noncentral t distribution with pairs - 1 degrees of freedom
+/// and noncentrality margin / (sd / sqrt(pairs)), and t the 95 % quantile of Student's (the usual
 /// approximation to Owen 1965; Julious, Statistics in Medicine 2004).
 /// \test EquivalencePower.EqualsTheShareOfSimulatedStudies
 double equivalence_power(std::size_t pairs, double standard_deviation, double margin);
 
-/// Fewest pairs with that much power, at most a million; 0 when even these do not reach it.
+/// Fewest pairs with that much power, at most a million. 0 when even these do not reach it.
 std::size_t pairs_for_equivalence(double standard_deviation, double margin, double power = 0.9);
 
 }  // namespace af::evaluation

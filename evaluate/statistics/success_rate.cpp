@@ -20,7 +20,7 @@ ProportionInterval wilson_interval(std::int64_t successes, std::int64_t trials, 
   const double denominator = 1.0 + z * z / n;
   const double center = (p + z * z / (2.0 * n)) / denominator;
   const double half = z * std::sqrt(p * (1.0 - p) / n + z * z / (4.0 * n * n)) / denominator;
-  // Exactly 0 and 1 at the ends, where rounding would leave 1e-17.
+  // The ends are set to exactly 0 and 1, where rounding would leave 1e-17.
   return {successes == 0 ? 0.0 : center - half, successes == trials ? 1.0 : center + half};
 }
 
@@ -44,7 +44,7 @@ std::optional<CumulativeCaptureRange> cumulative_capture_range(std::span<const T
   std::int64_t successes = 0;
   for (std::size_t i = 0; i < sorted.size(); ++i) {
     successes += sorted[i].error_mm < threshold_mm ? 1 : 0;
-    // Starts of equal error are taken together.
+    // Starts with the same initial TRE are taken together.
     if (i + 1 < sorted.size() && sorted[i + 1].initial_tre_mm == sorted[i].initial_tre_mm) continue;
     const auto starts = static_cast<std::int64_t>(i + 1);
     if (static_cast<double>(successes) >= share * static_cast<double>(starts))

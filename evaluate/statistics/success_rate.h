@@ -10,10 +10,10 @@
 
 namespace af::evaluation {
 
-/// The paper's: an end with an error below this is a success (Sec. IV-B).
+/// The paper's threshold: an end with an error below this is a success (Sec. IV-B).
 inline constexpr double kSuccessTreMm = 2.5;
 
-/// Below which ends are counted, mm.
+/// Thresholds below which ends are counted, mm.
 inline constexpr std::array<double, 5> kLadderMm = {1.0, 2.0, 2.5, 5.0, 10.0};
 
 /// The share of starts that must succeed inside a capture range.
@@ -25,7 +25,7 @@ struct ProportionInterval {
 };
 
 /// Score interval of a proportion (Wilson 1927). Its two-sided coverage stays close to `confidence`
-/// even for few trials and rates near 0 or 1. Without trials [0, 1].
+/// even for few trials and rates near 0 or 1. Without trials it is [0, 1].
 /// \test WilsonInterval.EqualsPublishedValues
 ProportionInterval wilson_interval(std::int64_t successes,
                                    std::int64_t trials,
@@ -47,30 +47,30 @@ struct IntervalSuccess {
 /// One registration for the success statistics.
 struct TreOutcome {
   double initial_tre_mm = 0.0;
-  double error_mm = 0.0;  ///< of the end; NaN: failed
+  double error_mm = 0.0;  ///< of the end; NaN: the registration failed
 };
 
-/// Number of outcomes with an error below `threshold_mm`; NaN never is.
+/// Number of outcomes with an error below `threshold_mm`. NaN never is.
 std::int64_t count_successes(std::span<const TreOutcome> outcomes, double threshold_mm);
 
 /// The initial TRE up to which enough of all starts together succeed.
 struct CumulativeCaptureRange {
   double initial_tre_mm = 0.0;  ///< the largest initial TRE with enough success up to it
-  std::int64_t starts = 0;      ///< that began at or below it
+  std::int64_t starts = 0;      ///< how many began at or below it
   std::int64_t successes = 0;
-  bool is_whole_study = false;  ///< it is the farthest start: the true range may be larger
+  bool is_whole_study = false;  ///< it is the farthest start, so the true range may be larger
 };
 
 /// The largest initial TRE d of any outcome such that at least `share` of the outcomes with an
 /// initial TRE of at most d succeeded; nullopt when there is none. Outcomes without an initial TRE
-/// are left out. Many close starts that succeed make up for far ones that fail, so that it reaches
-/// at least to the farthest start inside capture_range(), and often much farther. \test
+/// are left out. Many close starts that succeed make up for far ones that fail. The range therefore
+/// reaches at least to the farthest start inside capture_range(), and often much farther. \test
 /// CumulativeCaptureRange.IsTheLargestErrorWithEnoughSuccessBelowIt
 std::optional<CumulativeCaptureRange> cumulative_capture_range(std::span<const TreOutcome> outcomes,
                                                                double share = kCaptureShare,
                                                                double threshold_mm = kSuccessTreMm);
 
-/// Success per interval [k, k + 1) * width; outcomes whose initial TRE lies beyond the last
+/// Success per interval [k, k + 1) * width. Outcomes whose initial TRE lies beyond the last
 /// interval are left out.
 std::vector<IntervalSuccess> success_per_interval(std::span<const TreOutcome> outcomes,
                                                   int intervals,
@@ -78,7 +78,7 @@ std::vector<IntervalSuccess> success_per_interval(std::span<const TreOutcome> ou
                                                   double threshold_mm = kSuccessTreMm);
 
 /// Sums, interval by interval, the starts of the cases that `drawn` names, as often as it names
-/// them. All cases have the same intervals; Wilson's interval is left as it was.
+/// them. All cases have the same intervals. Wilson's interval is left as it was.
 std::vector<IntervalSuccess> pooled_intervals(std::span<const std::vector<IntervalSuccess>> cases,
                                               std::span<const std::size_t> drawn);
 
@@ -98,14 +98,15 @@ struct CaptureRange {
   std::int64_t starts = 0;      ///< in the intervals up to there
   std::int64_t successes = 0;
   CaptureEnd end = CaptureEnd::NoStarts;
-  std::size_t end_interval = 0;  ///< the interval that ends it, from 0; their number: none does
+  std::size_t end_interval =
+      0;  ///< the interval that ends it, from 0; the number of intervals: none does
 
-  /// The true range may be larger.
+  /// Whether the true range may be larger.
   [[nodiscard]] bool is_whole_study() const { return end != CaptureEnd::Failures; }
 };
 
 /// The capture range of van de Kraats et al. (IEEE TMI 24(9), 2005): the first interval of initial
-/// TRE with a success below `share` ends it. `intervals` are as success_per_interval() has them.
+/// TRE with a success below `share` ends it. `intervals` come from success_per_interval().
 /// \test CaptureRange.EndsAtTheFirstIntervalWithTooManyFailures
 CaptureRange capture_range(std::span<const IntervalSuccess> intervals,
                            double share = kCaptureShare);

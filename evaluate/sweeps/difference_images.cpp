@@ -28,8 +28,8 @@ const std::vector<double>& paper_levels_db() {
   return levels;
 }
 
-/// Rank 0 knows the comparisons; all ranks need the choice. A DRR that is nearest to several levels
-/// is shown once.
+/// Rank 0 knows the comparisons, but all ranks need the choice. A DRR that is nearest to several
+/// levels is shown once.
 Shared<std::vector<SweepDrr>> shared_choice(const std::vector<SettingResult>& results,
                                             const Communicator& world) {
   const auto choose = [&] {
@@ -141,7 +141,7 @@ json write_difference_images(const std::vector<SettingResult>& results,
   if (drrs.empty()) return nullptr;
   std::vector<std::string> warnings;
   const PrecomputeOptions& setting = results[drrs.front().result].setting;
-  // The setting's reading of the CT is the one in force.
+  // The CT is read as the setting says.
   const NodeCt ct = read_ct_per_node(
       setting.ct.empty()
           ? shared_study(setting.study, world)->find_case(setting.case_name).ct.string()

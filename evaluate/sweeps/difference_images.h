@@ -11,7 +11,7 @@
 
 namespace af::evaluation {
 
-/// One DRR of a sweep: which field, which of its poses.
+/// One DRR of a sweep: which field, and which of its poses.
 struct SweepDrr {
   std::size_t result = 0;
   std::size_t pose = 0;
@@ -20,14 +20,14 @@ struct SweepDrr {
   bool operator==(const SweepDrr&) const = default;
 };
 
-/// For each PSNR level, the setting nearest to it. All are of one target and pose: those with the
-/// least sum of distances from the levels. Empty when nothing could be compared.
+/// For each PSNR level, the setting nearest to it. All belong to one target and pose: those with
+/// the least sum of distances from the levels. Empty when nothing could be compared.
 /// \test DifferenceImages.AreThoseNearestToTheLevelsAtOnePose
 std::vector<SweepDrr> drrs_at_levels(const std::vector<SettingResult>& results,
                                      const std::vector<double>& levels_db);
 
 /// Collective. The paper's Fig. 9: difference images, field - ray casting, of DRRs of about 36, 40
-/// and 44 dB at one pose, from fields of different settings, with one common window:
+/// and 44 dB at one pose, from fields of different settings, with one common window. Writes
 /// difference-images.png and .csv. Returns the entry of summary.json; null when nothing could be
 /// compared.
 nlohmann::json write_difference_images(const std::vector<SettingResult>& results,

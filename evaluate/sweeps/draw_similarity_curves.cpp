@@ -60,8 +60,8 @@ std::vector<Curve> empty_curves(const SimilarityCurvesOptions& options) {
   return curves;
 }
 
-/// Collective. Fills the curves on rank 0. One method after the other, so that blocks of the work
-/// queue hold work of one duration.
+/// Collective. Fills the curves on rank 0. Methods come one after the other, so that blocks of the
+/// work queue hold work of one duration.
 void measure_curves(std::vector<LoadedMethod>& methods,
                     const PoseFrame& gold_frame,
                     const RunFolder& run,
@@ -97,8 +97,8 @@ void measure_curves(std::vector<LoadedMethod>& methods,
   }
 }
 
-/// The level against which widths are measured: the lowest similarity of any curve of the renderer,
-/// so that axes can be compared.
+/// The level from which widths are measured: the lowest similarity of any curve of the renderer, so
+/// that axes can be compared.
 double base_of(const std::vector<Curve>& curves, const std::string& renderer) {
   double base = std::numeric_limits<double>::infinity();
   for (const Curve& curve : curves)
@@ -113,7 +113,7 @@ void find_peaks(std::vector<Curve>& curves) {
     curve.peak = find_peak(curve.offsets, curve.similarity, base_of(curves, curve.renderer));
 }
 
-/// What both tables begin with.
+/// The first columns of both tables.
 CsvCells axis_cells(const Curve& curve) {
   return {{"renderer", curve.renderer},
           {"parameter", kAxisNames[static_cast<std::size_t>(curve.axis)]},
@@ -130,7 +130,7 @@ CsvTable curves_table(const std::vector<Curve>& curves) {
   return csv_table(std::move(rows));
 }
 
-/// Width in mm: of angles, at the target box's RMS radius about the centre of rotation.
+/// Width in mm. For angles, it is that at the target box's RMS radius about the centre of rotation.
 double width_mm(const Curve& curve, double radius_mm) {
   return curve.axis < 3 ? curve.peak.width * kRadPerDeg * radius_mm : curve.peak.width;
 }
@@ -148,7 +148,7 @@ CsvTable maxima_table(const std::vector<Curve>& curves, double radius_mm) {
   });
 }
 
-/// The axis of the widest peak. A width that leaves the window counts as widest; when two or more
+/// The axis of the widest peak. A width that leaves the window counts as widest. When two or more
 /// leave it, the result is empty.
 std::string broadest_axis(const std::vector<Curve>& curves,
                           const std::string& renderer,
@@ -225,8 +225,8 @@ std::vector<std::string> problems(const SimilarityCurvesOptions& options) {
 void SimilarityCurvesOptions::describe(Fields& field) {
   field.part<MethodOptions>(*this);
   field("case", case_name, "Case of the study (default: its only one)");
-  field("half_width_mm", half_width_mm, "Translations reach so far, mm");
-  field("half_width_deg", half_width_deg, "Rotations reach so far, degrees");
+  field("half_width_mm", half_width_mm, "Largest translation to either side, mm");
+  field("half_width_deg", half_width_deg, "Largest rotation to either side, degrees");
   field("curve_step_mm", curve_step_mm, "Step of translations, mm");
   field("curve_step_deg", curve_step_deg, "Step of rotations, degrees");
   field.part(resume);

@@ -77,7 +77,7 @@ BudgetStep step_of(const BudgetRun& run,
   return step;
 }
 
-/// Standard error of the mean change: its differences are paired, from the same starts.
+/// Standard error of the mean change. Its differences are paired, because the starts are the same.
 double standard_error_mm(const std::vector<PoseParameters>& ends,
                          const std::vector<PoseParameters>& previous,
                          const TargetDistance& distance) {

@@ -21,7 +21,7 @@ struct SettingResult {
   double creation_seconds = 0.0;
   int creation_ranks = 0;
   std::uint64_t uncompressed_bytes = 0;
-  std::vector<DrrComparison> comparisons;  ///< rank 0
+  std::vector<DrrComparison> comparisons;  ///< on rank 0
 
   /// "skull A", or the camera alone when no case is named.
   [[nodiscard]] std::string target() const;
@@ -30,17 +30,18 @@ struct SettingResult {
 /// Share of the tiles; sweeps always state it.
 double training_share(const PrecomputeOptions& setting);
 
-/// All samples of the uncropped planes at 16 bits, what the paper calls the uncompressed field.
+/// Size of all samples of the uncropped planes at 16 bits, which the paper calls the uncompressed
+/// field.
 std::uint64_t uncompressed_bytes_of(const PrecomputeOptions& setting);
 
-/// Creation time and ranks as the field's file has them.
+/// Reads creation time and ranks from the field's file.
 void read_creation(SettingResult& result);
 
-/// The tables, the figure and the part of summary.json of a sweep; every target (camera of a case)
-/// has the same settings in the same order, the base setting first, one target after the other. A
-/// setting's DRRs are pooled over the targets, sizes and times averaged. Writes
-/// field-parameters.csv (a row per setting: Table I), field-parameters-fields.csv (per field),
-/// field-parameters-poses.csv (per DRR) and field-parameters.svg and .png (Fig. 10).
+/// Writes the tables and the figure of a sweep, and returns its part of summary.json. Every target
+/// (camera of a case) has the same settings in the same order, the base setting first, one target
+/// after the other. A setting's DRRs are pooled over the targets; sizes and times are averaged.
+/// Writes field-parameters.csv (a row per setting: Table I), field-parameters-fields.csv (per
+/// field), field-parameters-poses.csv (per DRR), and field-parameters.svg and .png (Fig. 10).
 nlohmann::json write_sweep(const std::vector<SettingResult>& results,
                            const std::filesystem::path& folder);
 

@@ -10,11 +10,11 @@
 namespace af::evaluation {
 namespace {
 
-/// How far a camera moves along u, v, s or t of its field per rad or mm of the patient's motion.
+/// How far a camera moves along u, v, s or t of its field per rad or mm that the patient moves.
 Eigen::Vector3d moved_by(int axis, const CameraGeometry& camera, const Eigen::Vector3d& center) {
   const Eigen::Vector3d along = axis % 2 == 0 ? camera.column_direction : camera.row_direction;
   if (axis >= 2) return -along;
-  // The patient turns by w: about the CT the source moves by -w x (source - center).
+  // When the patient turns by w, the source moves about the CT by -w x (source - center).
   return -(camera.source_point - center).cross(along);
 }
 
@@ -45,7 +45,7 @@ std::vector<LatticePose> lattice_poses(const std::array<PoseParameters, kCellAxe
   for (int u = 0; u < fractions; ++u)
     for (int s = 0; s < fractions; ++s)
       for (int t = 0; t < fractions; ++t) {
-        // An orthogonal array: any three of the four numbers tell the fourth.
+        // An orthogonal array: any three of the four numbers determine the fourth.
         LatticePose pose = {{u, (u + s + t) % fractions, s, t}, {}};
         for (std::size_t axis = 0; axis < kCellAxes; ++axis) {
           const double cells = (pose.fraction[axis] + 0.5) / fractions - 0.5;

@@ -25,7 +25,7 @@ namespace {
 
 using nlohmann::json;
 
-/// A run of the chain as its folder has it.
+/// A run of the chain, read from its folder.
 struct ChainRun {
   EvaluationRun files;
   std::string starts_text;
@@ -105,7 +105,7 @@ CsvTable budget_table(const ErrorBudget& budget) {
   });
 }
 
-/// The gold standard's own error, of the chain's last run that has fiducials.
+/// The gold standard's own error, from the chain's last run that has fiducials.
 json gold_of(const std::vector<ChainRun>& runs) {
   json result;
   for (const ChainRun& run : runs) {

@@ -28,14 +28,15 @@
 namespace af::evaluation {
 namespace {
 
-/// Every start lies so from its true pose, about 1 mm over a target of 60 mm.
+/// Every start lies this far from its true pose, about 1 mm over a target of 60 mm.
 constexpr std::array<double, 6> kStartDegAndMm = {0.3, -0.3, 0.3, 0.6, -0.5, 0.6};
 
 /// The ends of one renderer, in the order of the poses.
 struct LatticeEnds {
   std::string renderer;
-  std::vector<std::array<double, 6>> errors;  ///< end from truth, deg and mm; NaN: did not converge
-  std::vector<double> distance_mm;            ///< mean over the target box, of those that converged
+  std::vector<std::array<double, 6>>
+      errors;                       ///< from truth to end, deg and mm; NaN: did not converge
+  std::vector<double> distance_mm;  ///< mean over the target box, for those that converged
 };
 
 /// Collective. The cells of the fields of a case.
@@ -49,7 +50,7 @@ std::vector<CellView> cells_of(const Study& study,
     const auto path = given.find(view.camera);
     const auto field = read_field(path != given.end() ? path->second : *view.field, world);
     const LightSlab& planes = field->light_slab;
-    // The (s,t) nodes of several slabs are about equally far apart: their mean.
+    // The (s,t) nodes of several slabs are about equally far apart, so their mean is taken.
     double s_mm = 0.0;
     double t_mm = 0.0;
     for (const SlabGeometry& slab : planes.slabs) {
@@ -77,7 +78,7 @@ std::shared_ptr<registration::RegistrationProblem> with_ideal_xrays(
   return result;
 }
 
-/// The ends from the truth of every pose, by the methods that were asked for.
+/// The ends relative to the truth for every pose, by the requested methods.
 std::vector<LatticeEnds> measured_ends(const std::vector<LoadedMethod>& methods,
                                        const LatticeErrorsOptions& options,
                                        const RigidTransform& gold_room_from_ct,
@@ -116,13 +117,13 @@ std::vector<LatticeEnds> measured_ends(const std::vector<LoadedMethod>& methods,
 
 CsvTable poses_table(const std::vector<LatticePose>& poses, const std::vector<LatticeEnds>& ends) {
   std::vector<CsvCells> rows;
-  for (const LatticeEnds& of : ends)
+  for (const LatticeEnds& run : ends)
     for (std::size_t i = 0; i < poses.size(); ++i) {
-      CsvCells& cells = rows.emplace_back(CsvCells{{"renderer", of.renderer}, {"pose", i}});
+      CsvCells& cells = rows.emplace_back(CsvCells{{"renderer", run.renderer}, {"pose", i}});
       for (std::size_t axis = 0; axis < kCellAxisNames.size(); ++axis)
         cells.emplace_back(std::string(kCellAxisNames[axis]) + "_fraction",
                            poses[i].fraction[axis]);
-      append("error_", kParameterNames, of.errors[i], cells);
+      append("error_", kParameterNames, run.errors[i], cells);
     }
   return csv_table(std::move(rows));
 }
@@ -134,11 +135,11 @@ std::string markdown(const std::vector<LatticePose>& poses,
   std::string text =
       "| Renderer | Cell of | mm, per camera | Amplitude, mm: tx, ty, tz | deg: rx, ry, rz "
       "|\n|---|---|---|---|---|\n";
-  for (const LatticeEnds& of : ends)
+  for (const LatticeEnds& run : ends)
     for (int axis = 0; axis < kCellAxes; ++axis) {
       const auto at = static_cast<std::size_t>(axis);
-      const std::array<double, 6> values = amplitude_along(axis, poses, of.errors, fractions);
-      text += "| " + of.renderer + " | " + kCellAxisNames[at] + " | ";
+      const std::array<double, 6> values = amplitude_along(axis, poses, run.errors, fractions);
+      text += "| " + run.renderer + " | " + kCellAxisNames[at] + " | ";
       for (std::size_t i = 0; i < views.size(); ++i)
         text += (i == 0 ? "" : ", ") + fixed_text(views[i].spacing_mm[at], 2);
       text += " |";
@@ -147,9 +148,9 @@ std::string markdown(const std::vector<LatticePose>& poses,
                 ", " + fixed_text(values[first + 2], 4) + " |";
       text += "\n";
     }
-  for (const LatticeEnds& of : ends) {
-    const SampleSummary distance = summarize(of.distance_mm);
-    text += "\n" + of.renderer + ": " + std::to_string(distance.count) + " of " +
+  for (const LatticeEnds& run : ends) {
+    const SampleSummary distance = summarize(run.distance_mm);
+    text += "\n" + run.renderer + ": " + std::to_string(distance.count) + " of " +
             std::to_string(poses.size()) +
             " converged; distance of the end from the true pose, mm: median " +
             fixed_text(distance.median, 4) + ", largest " + fixed_text(distance.maximum, 4) + "\n";
@@ -197,7 +198,7 @@ void run_lattice_errors(const LatticeErrorsOptions& options,
       all_or_none(world, [&] { return study->find_case(options.case_name); });
   const GoldStandard gold =
       all_or_none(world, [&] { return gold_standard(study, study_case, options.gold); });
-  // Ray casting is loaded in any case: it makes the X-rays.
+  // Ray casting is always loaded, because it makes the X-rays.
   MethodOptions loading = static_cast<const MethodOptions&>(options);
   loading.renderer = "both";
   LoadedInputs ignored;

@@ -11,7 +11,7 @@
 namespace af::evaluation {
 namespace {
 
-/// Where the curve crosses `level` when walking from `peak` by `direction`; NaN when it does not
+/// Where the curve crosses `level` on the way from `peak` in this direction. NaN when it does not
 /// before its end or a hole.
 double crossing(double level,
                 std::span<const double> offsets,
@@ -53,7 +53,7 @@ PoseParameters along_axis(int axis, double offset) {
 
 std::vector<double> curve_offsets(double half_width, double step) {
   check(half_width > 0.0 && step > 0.0 && step <= half_width, "a curve has a width and a step");
-  // A width that is a whole number of steps but for rounding has its end.
+  // A width that is a whole number of steps, except for rounding, includes its end.
   const auto steps = static_cast<int>(half_width / step + 1e-9);
   std::vector<double> offsets;
   for (int i = -steps; i <= steps; ++i) offsets.push_back(i * step);

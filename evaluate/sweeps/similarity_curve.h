@@ -22,12 +22,12 @@ struct CurvePeak {
   double offset = 0.0;      ///< vertex of the parabola through the highest point and its neighbours
   double similarity = 0.0;  ///< of the highest point
   bool is_at_edge = false;  ///< the highest point is the first or last: the maximum may lie beyond
-  /// Width at the level halfway between the highest value and `base`; NaN when the curve stays
+  /// Width at the level halfway between the highest value and `base`. NaN when the curve stays
   /// above it on one side.
   double width = 0.0;
 };
 
-/// Finds the peak of a curve with equal steps; NaN values (poses outside a field) are holes. Throws
+/// Finds the peak of a curve with equal steps. NaN values (poses outside a field) are holes. Throws
 /// InputError when no value is finite. \test CurvePeak.OfAParabolaIsItsVertex
 CurvePeak find_peak(std::span<const double> offsets,
                     std::span<const double> similarity,

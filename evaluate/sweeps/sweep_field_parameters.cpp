@@ -40,7 +40,7 @@ using nlohmann::json;
 
 constexpr const char* kComparisonStage = "comparison";
 
-/// Settings of a sweep, each once, in the order of sweeps; the base setting first.
+/// Settings of a sweep, each once, in the order of sweeps, with the base setting first.
 std::vector<PrecomputeOptions> settings_of(const FieldParametersOptions& options,
                                            const PrecomputeOptions& stated) {
   const PrecomputeOptions base = stated.in_force();
@@ -75,8 +75,8 @@ OptionTexts options_of_field(const std::string& toml) {
   return options;
 }
 
-/// Collective. The field of a setting, made unless it is there. FileError when one of that name was
-/// made with other options.
+/// Collective. The field of a setting, which is made unless it exists. Throws FileError when one of
+/// that name was made with other options.
 std::shared_ptr<const CompressedAttenuationField> field_of(const PrecomputeOptions& setting,
                                                            const std::string& command_line,
                                                            const Communicator& world,
@@ -159,7 +159,7 @@ std::vector<Target> targets_of(const FieldParametersOptions& options) {
   return targets;
 }
 
-/// The cost of a setting relative to that of another: the rays of its field.
+/// The cost of a setting relative to others: how many rays its field has.
 double rays_of(const PrecomputeOptions& setting) {
   return std::pow(static_cast<double>(setting.design().uv_nodes) * setting.design().st_nodes, 2.0);
 }
@@ -182,7 +182,7 @@ void announce_rest(const std::vector<PrecomputeOptions>& settings,
              duration_text(seconds));
 }
 
-/// Collective. Every setting's field of one target, made or reused, and its comparisons.
+/// Collective. Every setting's field for one target, made or reused, and its comparisons.
 void sweep_target(const FieldParametersOptions& options,
                   const Target& target,
                   const std::filesystem::path& fields,
@@ -250,7 +250,8 @@ std::vector<std::string> problems(const FieldParametersOptions& options) {
 
 namespace {
 
-/// The setting that all sweeps share: few of the options of af-precompute, some by other names.
+/// The setting that all sweeps share. It has few of the options of af-precompute, some with other
+/// names.
 void describe_base(Fields& field, PrecomputeOptions& base) {
   const char* const why = "the sweeps have the defaults of af-precompute";
   field.part(base);

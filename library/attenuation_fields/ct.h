@@ -28,11 +28,11 @@ struct ATTENUATION_FIELDS_API CtGrid {
 /// A CT in Hounsfield units. Copies share the voxels, which do not change.
 class ATTENUATION_FIELDS_API Ct {
  public:
-  /// A DICOM folder, NIfTI, MetaImage or NRRD file. `series_uid` chooses one of several DICOM
-  /// series. InputError, FileError, as the programs.
+  /// Reads a DICOM folder, or a NIfTI, MetaImage or NRRD file. `series_uid` chooses one of several
+  /// DICOM series. Throws InputError and FileError as the programs do.
   static Ct read(const std::filesystem::path& path, const std::string& series_uid = "");
-  /// Uses voxels that exist already, i fastest; `owner` keeps them, and nobody may change them.
-  /// InputError when their number does not fit the grid, or the grid is invalid.
+  /// Uses voxels that exist already, i fastest. `owner` keeps them, and nobody may change them.
+  /// Throws InputError when their number does not fit the grid, or the grid is invalid.
   static Ct from_voxels(const CtGrid& grid,
                         std::shared_ptr<const void> owner,
                         std::span<const std::int16_t> hu);
@@ -42,8 +42,8 @@ class ATTENUATION_FIELDS_API Ct {
   [[nodiscard]] std::span<const std::int16_t> hu() const;
   /// What read() found odd.
   [[nodiscard]] const std::vector<std::string>& warnings() const;
-  /// Over size and voxels in ascending LPS: one CT has one hash in every format. It does not say
-  /// where the voxels lie: Field::is_of() compares that, too.
+  /// Hash over size and voxels in ascending LPS, so that one CT has the same hash in every format.
+  /// It does not say where the voxels lie; Field::is_of() compares that too.
   [[nodiscard]] std::string content_sha256() const;
 
  private:

@@ -9,7 +9,7 @@
 namespace attenuation_fields {
 
 /// Base of all errors that this library throws on purpose, with the text that the programs print.
-/// Memory that cannot be had is std::bad_alloc.
+/// Memory that is not available gives std::bad_alloc.
 class ATTENUATION_FIELDS_API Error : public std::runtime_error {
  public:
   Error(const std::string& message, int exit_code);
@@ -21,7 +21,7 @@ class ATTENUATION_FIELDS_API Error : public std::runtime_error {
   int exit_code_;
 };
 
-/// Readable but unacceptable input (exit code 3): the text names field, value, constraint and, when
+/// Readable but unacceptable input (exit code 3). The text names field, value, constraint and, when
 /// there is one, file and line.
 class ATTENUATION_FIELDS_API InputError : public Error {
  public:

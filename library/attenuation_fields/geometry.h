@@ -30,15 +30,16 @@ struct ATTENUATION_FIELDS_API Camera {
   std::array<int, 2> size_px = {0, 0};                  ///< columns, rows
 
   /// The camera of a 3x4 projection matrix (pixels from room mm; row by row). Its sign is chosen so
-  /// that `isocenter_point` has positive depth; the spacing fixes the detector's distance.
-  /// InputError when the matrix is singular or has skew, or pixels that do not fit the spacing.
+  /// that `isocenter_point` has positive depth, and the spacing fixes the detector's distance.
+  /// Throws InputError when the matrix is singular or has skew, or pixels that do not fit the
+  /// spacing.
   static Camera from_projection_matrix(const std::string& name,
                                        const std::array<double, 12>& pixels_from_room,
                                        const std::array<double, 2>& pixel_spacing_mm,
                                        const std::array<int, 2>& size_px,
                                        const Vector3& isocenter_point = {0.0, 0.0, 0.0});
 
-  /// InputError that names every value that no camera has.
+  /// Throws InputError that names every impossible value.
   void require_sound() const;
   /// (column, row) where the ray from the source through a room point meets the detector plane.
   [[nodiscard]] std::array<double, 2> project(const Vector3& room_point) const;
@@ -50,17 +51,17 @@ struct ATTENUATION_FIELDS_API Rig {
   std::vector<Camera> cameras;
 
   /// A rig shipped by name ("c-arm-12in", "treatment-room") or a rig file. `warnings` receives what
-  /// is odd about it. InputError, FileError.
+  /// is odd about it. Throws InputError and FileError.
   static Rig read(const std::string& name_or_path, std::vector<std::string>* warnings = nullptr);
-  /// InputError that names every value that no rig has, its cameras' included.
+  /// Throws InputError that names every impossible value, including those of its cameras.
   void require_sound() const;
   /// The text of a rig file that read() reads back to the last bit.
   [[nodiscard]] std::string to_toml() const;
-  /// InputError that lists the known names.
+  /// The camera of that name. Throws InputError that lists the known names.
   [[nodiscard]] const Camera& camera(const std::string& name) const;
 };
 
-/// What six pose parameters are relative to, (R0, c, r) of
+/// The origin of six pose parameters, (R0, c, r) in
 ///
 ///     x_room = r + t + Rz(rz) Ry(ry) Rx(rx) R0 (x_ct - c)
 ///
@@ -73,7 +74,7 @@ struct ATTENUATION_FIELDS_API PoseFrame {
   /// The frame whose nominal pose is `nominal` and whose rotations are about `center_ct_mm`.
   static PoseFrame about(const Pose& nominal, const Vector3& center_ct_mm);
 
-  /// The pose of rotations about the room's axes (degrees) and translations along them (mm).
+  /// The pose of rotations about the room's axes (degrees) and translations along them (mm). Throws
   /// InputError when it is not finite or leads out of the world.
   [[nodiscard]] Pose pose(const Vector3& rotation_deg, const Vector3& translation_mm) const;
   /// The six parameters of a pose: rx, ry, rz in degrees, tx, ty, tz in mm.
@@ -81,7 +82,7 @@ struct ATTENUATION_FIELDS_API PoseFrame {
 };
 
 /// A pose from a file: TOML or JSON with `room_from_ct` (a result.json works), an ITK transform, or
-/// 16 numbers. InputError, FileError.
+/// 16 numbers. Throws InputError and FileError.
 [[nodiscard]] ATTENUATION_FIELDS_API Pose read_pose(const std::filesystem::path& path);
 
 }  // namespace attenuation_fields

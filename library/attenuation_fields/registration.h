@@ -19,44 +19,44 @@
 
 namespace attenuation_fields {
 
-/// The presets by name, and a line that explains them.
+/// The names of the presets, and a line that explains them.
 [[nodiscard]] ATTENUATION_FIELDS_API std::vector<std::string> preset_names();
 [[nodiscard]] ATTENUATION_FIELDS_API std::string preset_help();
 
-/// The options of af-register of the same names.
+/// The options of af-register with the same names.
 struct RegistrationOptions {
   std::string preset = {};                                   ///< empty: robust
   std::string renderer = "field";                            ///< "field" or "raycast"
-  std::map<std::string, std::filesystem::path> fields = {};  ///< camera -> field, over the study's
-  /// camera -> field that is open already, over `fields`. Cases share what registration needs of
-  /// it: it is neither read nor decoded again, whatever becomes of its file, and keeps what was
-  /// decoded. An atlas's members are read again, and only of the file that was opened. Its look-up,
-  /// camera, threads and beam are of its own DRRs alone.
+  std::map<std::string, std::filesystem::path> fields = {};  ///< camera -> field; not the study's
+  /// camera -> field that is open already; replaces `fields`. Cases share what registration needs
+  /// of it. It is neither read nor decoded again, whatever becomes of its file, and keeps what was
+  /// decoded. An atlas's members are read again, but only from the file that was opened. Its
+  /// look-up, camera, threads and beam apply only to its own DRRs.
   std::map<std::string, Field> opened_fields = {};
-  std::vector<std::string> chains = {};        ///< replace the preset's chains
-  std::optional<std::string> similarity = {};  ///< of every stage
-  std::optional<std::string> optimizer = {};   ///< of every stage
+  std::vector<std::string> chains = {};        ///< replaces the preset's chains
+  std::optional<std::string> similarity = {};  ///< for every stage
+  std::optional<std::string> optimizer = {};   ///< for every stage
   std::optional<int> max_evaluations = {};
   std::optional<std::string> region = {};  ///< "target" or "study"
   bool correct = false;                    ///< corrects the end by ray casting
   bool skip_ct_check = false;              ///< with fields: the CT is not read
-  double water_mu_per_mm = 0.0200;         ///< of ray casting
+  double water_mu_per_mm = 0.0200;         ///< for ray casting
   int air_below_hu = -900;
   double step_mm = 1.0;
   std::uint64_t seed = 1;
-  bool no_uncertainty = false;  ///< no covariance and no TREs; the confidence is a lower bound
-  double calibration_error_px = 0.0;  ///< of every view's shift; covariances include it
+  bool no_uncertainty = false;  ///< no covariance and no TREs; the confidence is then a lower bound
+  double calibration_error_px = 0.0;  ///< in every view's shift; covariances include it
   int threads = 1;                    ///< for one registration; 0: every processor
 };
 
-/// Shares of an X-ray's gradients that the DRR at a pose explains, 0 to 1; NaN: not judged.
+/// Shares of an X-ray's gradients that the DRR at a pose explains, 0 to 1. NaN: not judged.
 struct ViewAgreement {
   std::string camera;
   double coarse = 0.0;
   double fine = 0.0;
 };
 
-/// An X-ray of a case, whole detector, row by row. The spans live as long as their `owner`.
+/// An X-ray of a case: the whole detector, row by row. The spans live as long as their `owner`.
 struct CaseView {
   Camera camera;
   std::array<int, 4> roi_px{};  ///< region of interest: column, row, width, height
@@ -65,15 +65,15 @@ struct CaseView {
   std::shared_ptr<const void> owner;
 };
 
-/// What a registration says of its own error; NaN where it cannot be said.
+/// What a registration says about its own error. NaN where it cannot be said.
 struct Uncertainty {
-  /// Of (rx, ry, rz, tx, ty, tz), deg and mm: the true pose is a motion after the pose that was
+  /// For (rx, ry, rz, tx, ty, tz), deg and mm. The true pose is a motion after the pose that was
   /// found, about the centre of the region of interest, along the room's axes.
   std::array<std::array<double, 6>, 6> covariance{};
-  /// Expected over the target box. TREs are calibrated by themselves: by the covariance, which is
-  /// to hold the truth in all six directions, they would be larger.
+  /// Expected over the target box. TREs are calibrated separately: from the covariance, which must
+  /// hold the truth in all six directions, they would be larger.
   double tre_rms_mm = 0.0;
-  double tre_95_mm = 0.0;   ///< stays below with a probability of 0.95
+  double tre_95_mm = 0.0;   ///< the TRE stays below this with a probability of 0.95
   double confidence = 0.0;  ///< probability of a TRE below 2.5 mm; a lower bound without TREs
 };
 
@@ -82,7 +82,7 @@ struct Registration {
   Pose start;
   Pose pose;                                 ///< the end
   std::array<double, 6> start_parameters{};  ///< deg, mm; relative to RegistrationCase::frame()
-  std::array<double, 6> parameters{};        ///< likewise, of the end
+  std::array<double, 6> parameters{};        ///< likewise, at the end
   std::string verdict;                       ///< "found", "doubtful" or "not found"
   std::string reason;                        ///< of the verdict
   double similarity = 0.0;                   ///< NaN when there is none
@@ -98,11 +98,11 @@ struct Registration {
   double seconds = 0.0;
 };
 
-/// A case of a study with all that its registrations need: X-rays, fields or CT. One call at a
-/// time; calls from other threads wait. Copies are the same case.
+/// A case of a study, with everything that its registrations need: X-rays, fields or CT. Only one
+/// call runs at a time; calls from other threads wait. Copies are the same case.
 class ATTENUATION_FIELDS_API RegistrationCase {
  public:
-  /// `case_name`: empty picks the only one. InputError, FileError.
+  /// An empty `case_name` picks the only case. Throws InputError and FileError.
   static RegistrationCase load(const std::filesystem::path& study,
                                const std::string& case_name = "",
                                const RegistrationOptions& options = {});
@@ -112,43 +112,44 @@ class ATTENUATION_FIELDS_API RegistrationCase {
                                const RegistrationOptions& options,
                                const Beam& beam);
 
-  /// Registers other X-rays from now on, of one camera or of several; fields and CT stay as they
+  /// Registers other X-rays from now on, of one camera or of several. Fields and CT stay as they
   /// are. An X-ray holds the values of the whole detector, row by row, in the domain that the
   /// study's `xray_domain` says. They are checked and prepared as if the study's file had held them
-  /// (and no header, such as DICOM's): the study's air level, flat and dark fields, distortion,
-  /// mask and fiducials apply, and registrations have the bits of a case that was loaded with them.
-  /// Start and gold standard stay the study's.
-  /// Returns what is odd about them. InputError, which leaves the case as it was.
+  /// (without a header such as DICOM's): the study's air level, flat and dark fields, distortion,
+  /// mask and fiducials apply. Registrations have the same bits as a case that was loaded with
+  /// them. Start and gold standard remain the study's.
+  /// Returns what is odd about them. When it throws InputError, the case is as it was before.
   std::vector<std::string> set_xray(const std::string& camera, std::span<const float> xray);
   std::vector<std::string> set_xrays(const std::map<std::string, std::span<const float>>& xrays);
 
   [[nodiscard]] const std::string& name() const;
-  /// With the X-rays that are in force.
+  /// The views with their current X-rays.
   [[nodiscard]] std::vector<CaseView> views() const;
   /// Nominal pose, about the centre of the region of interest.
   [[nodiscard]] const PoseFrame& frame() const;
   /// What is odd about the study.
   [[nodiscard]] const std::vector<std::string>& warnings() const;
-  /// The pose that errors are measured against, when the study knows one.
+  /// The pose from which errors are measured, when the study knows one.
   [[nodiscard]] std::optional<Pose> gold() const;
   /// Mean distance (mm) over the target box between where a pose and the gold pose put its points.
   [[nodiscard]] std::optional<double> tre_mm(const Pose& pose) const;
 
   /// The pose from the landmarks that the study states in CT and X-rays. nullopt when it states
-  /// none; InputError when no pose fits them.
+  /// none. Throws InputError when no pose fits them.
   [[nodiscard]] std::optional<Pose> landmark_start() const;
-  /// Where af-register starts when it is given no start: at landmark_start(), else at the nominal
-  /// pose. InputError as landmark_start().
+  /// Where af-register starts when it is given no start: at landmark_start(), or else at the
+  /// nominal pose. Throws InputError as landmark_start() does.
   [[nodiscard]] Pose usual_start() const;
 
-  /// Registers from a start. `start_index` is a key of random numbers. What af-register writes into
-  /// result.json, to the bit (its seconds excepted).
+  /// Registers from a start. `start_index` is a key of random numbers. The result is what
+  /// af-register writes into result.json, to the bit (except its seconds).
   [[nodiscard]] Registration run(const Pose& start, std::int64_t start_index = 0) const;
-  /// Registers from many starts; the start_index of each is its position. Verdicts are as in
+  /// Registers from many starts. The start_index of each is its position. Verdicts are as in
   /// registrations.csv: the X-rays are not examined, which may turn a verdict from found to
-  /// doubtful. af-register examines those of the best result, run() those of its own.
+  /// doubtful. af-register examines those of the best result, and run() those of its own.
   [[nodiscard]] std::vector<Registration> run_all(std::span<const Pose> starts) const;
-  /// The similarity that results are compared by, at a pose; nullopt where it is inadmissible.
+  /// The similarity by which results are compared, at a pose. nullopt where the pose is
+  /// inadmissible.
   [[nodiscard]] std::optional<double> similarity(const Pose& pose) const;
 
  private:

@@ -8,9 +8,9 @@
 
 namespace attenuation_fields {
 
-/// While it lives, calls of the library by its thread ask it whether to end early: about ten times
-/// a second, on this thread, and never of calls that are shorter. When it is met, they throw an
-/// Error of exit code 75, and what they were to write is undefined. Reading a file asks seldom.
+/// A condition for ending calls early. While it lives, calls of the library by its thread ask it
+/// about ten times a second, on this thread; shorter calls never ask it. When it is met, they throw
+/// an Error of exit code 75, and what they were writing is undefined. Reading a file asks seldom.
 class ATTENUATION_FIELDS_API StopCondition {
  public:
   explicit StopCondition(std::function<bool()> is_met);

@@ -14,8 +14,8 @@ struct AxisRanges {
 };
 
 /// The bounds of "rx=-15:15,ry=5,rz=-30:30" for the letter 'r': LOW:HIGH, or one number for both
-/// sides of zero. Axes that are not named get -`otherwise` to `otherwise`. UsageError, naming
-/// `option`, for an axis that is unknown or named twice, for text that is no number, and for
+/// sides of zero. Axes that are not named get -`otherwise` to `otherwise`. Throws UsageError,
+/// naming `option`, for an axis that is unknown or named twice, for text that is no number, and for
 /// descending bounds.
 AxisRanges axis_ranges(const std::string& option,
                        const std::string& text,

@@ -24,7 +24,7 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-/// Units that no rank holds yet, the costly ones first; the same list everywhere.
+/// Units that no rank holds yet, the costly ones first. The list is the same everywhere.
 std::vector<std::uint32_t> missing_units(const FieldBuild& build,
                                          const std::vector<std::uint64_t>& is_finished) {
   std::vector<std::uint64_t> holders = is_finished;
@@ -39,7 +39,7 @@ std::vector<std::uint32_t> missing_units(const FieldBuild& build,
   return missing;
 }
 
-/// Takes units in while they are made: training candidates, counts, and tiles while they fit.
+/// Takes in units while they are made: training candidates, counts, and tiles while they fit.
 class TileKeeper {
  public:
   TileKeeper(const FieldBuild& build, std::uint64_t kept_tile_bytes, CastPhase& cast)
@@ -72,7 +72,7 @@ void require_all(const FieldBuild& build, std::uint64_t finished) {
   });
 }
 
-/// Collective. From this rank's numbers to those of all ranks.
+/// Collective. Turns this rank's numbers into those of all ranks.
 void add_up(CastPhase& cast, double busy_seconds, const Communicator& communicator) {
   cast.rays_cast = sum_over(communicator, cast.rays_cast);
   cast.occupied_tiles_cast = sum_over(communicator, cast.occupied_tiles_cast);
@@ -110,7 +110,7 @@ CastPhase cast_field(const FieldBuild& build,
   double busy_seconds = 0.0;
   std::vector<std::uint16_t> samples;
   const auto work = [&](std::int64_t item) {
-    // After a stop request the rest of the queue is drained without being cast.
+    // After a stop request, the rest of the queue is drained without being cast.
     if (stop_requested()) return;
     const auto start = Clock::now();
     const WorkUnit& unit = build.units[missing[static_cast<std::size_t>(item)]];
@@ -170,7 +170,7 @@ TrainedCodebook train_field(const FieldBuild& build,
                             const ProgressCallback& on_progress,
                             const TrainingCheckpoints& checkpoints) {
   const CodebookReduction reduction = reduction_over(build.communicator);
-  // Every rank comes to the same conclusion; this makes it one error of the whole job.
+  // Every rank reaches the same conclusion. This makes it one error of the whole job.
   return all_or_none(build.communicator, [&] {
     TrainingShare share = cast.picker.take(reduction);
     remove_means(share, options.mean_step);

@@ -26,7 +26,7 @@ static_assert(kRunOfT == 2 * kMeanRunTiles, "units begin where differences of me
 using Clock = std::chrono::steady_clock;
 
 /// Deals out the units that nobody has kept, large ones first, each to the rank with the least to
-/// do. `loads` are the tiles kept by each rank on entry, all tiles dealt to it on return.
+/// do. `loads` holds the tiles that each rank kept on entry, and all tiles dealt to it on return.
 std::vector<std::size_t> balanced_owners(const std::vector<std::uint64_t>& unit_tiles,
                                          const std::vector<std::uint64_t>& is_kept,
                                          std::vector<std::uint64_t>& loads) {
@@ -44,13 +44,13 @@ std::vector<std::size_t> balanced_owners(const std::vector<std::uint64_t>& unit_
     auto [load, rank] = least.top();
     least.pop();
     owners[id] = rank;
-    // A unit without tiles costs a little, too.
+    // A unit without tiles also costs a little.
     least.emplace(loads[rank] = load + unit_tiles[id] + 1, rank);
   }
   return owners;
 }
 
-/// Over the codewords as they are searched.
+/// Checksum over the codewords as they are searched.
 std::uint32_t crc_of(const Codebook& codebook) {
   const std::vector<Tile> codewords = searched_codewords(codebook);
   const std::uint32_t crc = crc32c(std::as_bytes(std::span(codewords)));

@@ -12,7 +12,7 @@
 namespace af {
 
 /// Encodes units in rounds, for write_field(). Every rank encodes the units whose tiles it has
-/// kept; the others are dealt out so that all ranks encode about as many tiles.
+/// kept. The others are dealt out so that all ranks encode about the same number of tiles.
 class FieldEncoder {
  public:
   /// Collective. `cast` is emptied while encoding; it and `codebook` must outlive the encoder.
@@ -25,19 +25,19 @@ class FieldEncoder {
                Codebook&& codebook,
                TileOverflow overflow) = delete;
 
-  /// This rank's next units, about kRoundBytes of indices; none when it has no more. Units that an
-  /// earlier run encoded with the same codebook are read. StoppedError, with what is encoded saved,
-  /// when `stop_requested` says so.
+  /// This rank's next units, about kRoundBytes of indices. None when it has no more. Units that an
+  /// earlier run encoded with the same codebook are read. Throws StoppedError, with what is encoded
+  /// saved, when `stop_requested` says so.
   std::vector<IndexBlock> next_blocks(const ProgressCallback& on_progress = {},
                                       const StopRequested& stop_requested = {});
 
-  /// Collective. Sum over all ranks, in squared levels; valid once all blocks are made.
+  /// Collective. Sum over all ranks, in squared levels. Valid once all blocks are made.
   [[nodiscard]] std::uint64_t squared_error() const;
-  /// Collective. Seconds of every rank spent in next_blocks().
+  /// Collective. Seconds that every rank spent in next_blocks().
   [[nodiscard]] std::vector<double> busy_seconds() const;
-  /// This rank's units that were damaged when read back, and cast again.
+  /// How many of this rank's units were damaged when read back, and were cast again.
   [[nodiscard]] std::uint64_t units_damaged() const { return units_damaged_; }
-  /// Collective. Units that an earlier run had encoded, over all ranks.
+  /// Collective. How many units an earlier run had encoded, over all ranks.
   [[nodiscard]] std::uint64_t units_resumed() const;
 
   static constexpr std::size_t kRoundBytes = std::size_t{8} << 20;
@@ -46,9 +46,9 @@ class FieldEncoder {
   void deal_out_others();
   [[nodiscard]] UnitTiles tiles_again(const WorkUnit& unit);
   IndexBlock next_block();
-  /// Encodes the tiles in memory; `kept` null: makes the tiles again.
+  /// Encodes the tiles in memory, or makes the tiles again where `kept` is null.
   EncodedUnit encoded(const WorkUnit& unit, const UnitTiles* kept);
-  /// Whether the indices fit our codebook: a checksum proves only that a record is whole.
+  /// Whether the indices fit our codebook. A checksum only proves that a record is whole.
   [[nodiscard]] bool is_ours(const EncodedUnit& before, const WorkUnit& unit) const;
 
   const FieldBuild& build_;

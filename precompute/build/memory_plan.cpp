@@ -12,9 +12,9 @@ namespace af {
 
 namespace {
 
-/// Indices of one round: the blocks, HDF5's chunks and what they compress to.
+/// Memory for the indices of one round: the blocks, HDF5's chunks and what they compress to.
 constexpr std::uint64_t kRoundBytes = std::uint64_t{32} << 20;
-/// HDF5's index of the chunks while they are written, 100 bytes for a chunk of 8192 tiles.
+/// HDF5's index of the chunks while they are written: 100 bytes for a chunk of 8192 tiles.
 constexpr double kChunkIndexBytesPerTile = 100.0 / 8192.0;
 /// A rank's part of all tiles may exceed the mean by this.
 constexpr double kLargestShare = 1.3;
@@ -37,7 +37,7 @@ double unit_bytes(const std::vector<WorkUnit>& units, bool fits_uv) {
         fits_uv ? 2.0 * static_cast<double>(LeastSquaresFieldCaster::held_samples(unit)) : 0.0;
     const int u_count = unit.u.count + (fits_uv ? 2 : 0);
     const double sums = 4.0 * kRunOfT * u_count * unit.s.count;
-    // Tiles are made once the line integrals that samples are fitted to are gone.
+    // Tiles are made once the line integrals to which samples are fitted are gone.
     most = std::max(most, samples + std::max(samples, fitted) + sums);
   }
   constexpr double kBuffers = 4.0 * 0x1.0p20;
@@ -68,15 +68,15 @@ MemoryPlan plan_memory(const FieldLattice& lattice,
   const double candidates =
       kWithHeldOut * std::min(1.125 * cap, kLargestShare * fraction_tiles / ranks);
   const double share = kWithHeldOut * std::min(cap, fraction_tiles) / ranks;
-  // Tiles with nearest codeword, error and a key.
+  // A tile, its nearest codeword, its error and a key.
   constexpr double kTrainingBytes = kCandidateBytes + 4.0 + 8.0 + 8.0;
-  // Sums and their reduction, search coefficients, codewords drawn.
+  // Sums and their reduction, search coefficients, and drawn codewords.
   constexpr double kBytesPerCodeword = 600.0;
   const double codebook = kBytesPerCodeword * options.design().codewords;
   MemoryPlan plan;
   plan.fixed_bytes = fixed_bytes;
   plan.casting_bytes = static_cast<std::uint64_t>(kCandidateBytes * candidates + unit);
-  // While the share is copied from the candidates, these are still there.
+  // While the share is copied from the candidates, both exist.
   plan.training_bytes = static_cast<std::uint64_t>(
       std::max(kTrainingBytes * share + codebook, kCandidateBytes * (candidates + share)));
   const double chunk_index = kChunkIndexBytesPerTile * static_cast<double>(lattice.tile_count());

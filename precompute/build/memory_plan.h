@@ -8,8 +8,8 @@
 
 namespace af {
 
-/// Memory of one rank in each phase, without the CT and its grid (once per node) and without tiles
-/// that are kept between casting and encoding: upper bounds, from the plan alone.
+/// Memory of one rank in each phase: upper bounds, from the plan alone. They include neither the CT
+/// and its grid (once per node) nor tiles that are kept between casting and encoding.
 struct MemoryPlan {
   std::uint64_t fixed_bytes = 0;     ///< program, libraries, MPI
   std::uint64_t casting_bytes = 0;   ///< one unit, and training candidates
@@ -22,23 +22,24 @@ struct MemoryPlan {
   [[nodiscard]] std::uint64_t kept_tile_bytes(std::uint64_t limit_bytes) const;
 };
 
-/// `fixed_bytes`: of a rank before it casts.
+/// `fixed_bytes`: what a rank takes before it casts.
 MemoryPlan plan_memory(const FieldLattice& lattice,
                        const std::vector<WorkUnit>& units,
                        const PrecomputeOptions& options,
                        std::uint64_t fixed_bytes,
                        int ranks);
 
-/// The limit that applies: the option's, or else the default, raised to what a rank needs without
-/// keeping any tiles. InputError when the option's limit is below that need.
+/// The limit that applies: the option's, or else the default raised to what a rank needs without
+/// keeping any tiles. Throws InputError when the option's limit is below that need.
 std::uint64_t memory_limit(const PrecomputeOptions& options, const MemoryPlan& plan);
 
-/// Memory of this process, from the system (0 where it does not tell).
+/// Memory of this process as the system states it; 0 where it does not.
 struct ProcessMemory {
-  std::uint64_t own_bytes = 0;       ///< resident, private
-  std::uint64_t program_bytes = 0;   ///< resident, files: the program and its libraries
-  std::uint64_t shared_bytes = 0;    ///< resident, shared with other ranks of the node
-  std::uint64_t peak_own_bytes = 0;  ///< peak resident since forget_peak(), less program and shared
+  std::uint64_t own_bytes = 0;      ///< resident, private
+  std::uint64_t program_bytes = 0;  ///< resident, files: the program and its libraries
+  std::uint64_t shared_bytes = 0;   ///< resident, shared with other ranks of the node
+  std::uint64_t peak_own_bytes =
+      0;  ///< peak resident since forget_peak(), minus program and shared
 };
 
 ProcessMemory measured_memory();

@@ -148,10 +148,9 @@ void describe_casting(Fields& field, PrecomputeOptions& options) {
   step.help = "Trilinear caster: largest distance of samples along a ray, mm";
   field.part(options.attenuation);
   field.at("water_mu_per_mm").decides(kCastingStage);
-  field(
-      "material",
-      options.material,
-      "What of the CT the field holds: all, or bone alone, for a tube's spectrum (docs/spectra.md)")
+  field("material",
+        options.material,
+        "Part of the CT in the field: all, or only bone, for a tube's spectrum (docs/spectra.md)")
       .one_of({"all", "bone"})
       .decides(kCastingStage);
   field("projections",
@@ -355,7 +354,8 @@ StPlane PrecomputeOptions::st_plane_rule() const {
 }
 
 std::vector<std::string> problems(const PrecomputeOptions& options) {
-  std::vector<std::string> found = problems(options.range());  // UsageError where it is no range
+  std::vector<std::string> found =
+      problems(options.range());  // throws UsageError where it is no range
   if (!options.orbit.empty()) (void)orbit_of_text("--orbit", options.orbit);  // likewise
   append(field_problems(options), found);
   append(problems(options.codebook_options()), found);

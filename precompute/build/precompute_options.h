@@ -22,10 +22,10 @@ namespace af {
 /// Default memory limit of a rank, not counting what every node holds once.
 inline constexpr std::uint64_t kDefaultMemoryLimitBytes = std::uint64_t{300} << 20;
 
-/// Options of af-precompute: what is cast, how it is compressed, where it goes. Angles in degrees,
-/// as at every interface.
+/// Options of af-precompute: what is cast, how it is compressed, where it goes. Angles are in
+/// degrees, as at every interface.
 struct PrecomputeOptions {
-  // The CT, the camera and the pose about which the CT moves: named one by one ...
+  // The CT, the camera and the pose about which the CT moves are named one by one ...
   std::string ct;
   CtReadOptions ct_reading;
   std::string rig;
@@ -40,62 +40,63 @@ struct PrecomputeOptions {
   double max_translation_mm = 100.0;
   std::string rotation_range_deg;    ///< "rx=-15:15,ry=..."; axes not named: max_rotation_deg
   std::string translation_range_mm;  ///< "tx=..."; axes not named: max_translation_mm
-  std::string cover;                 ///< file of poses about each of which the range is taken
-  std::string cover_rig;             ///< further cameras whose rays the field is to hold
+  std::string cover;                 ///< file of poses; the range is taken about each of them
+  std::string cover_rig;             ///< further cameras whose rays the field must hold
   std::string orbit;                 ///< "axis=z,from=-90,to=90": an atlas instead of one field
   std::string orbit_cameras;         ///< rig: an atlas with a field for each of its cameras
   /// The design: a preset or a budget, and parts that are stated.
   std::optional<std::string> preset;
   DesignBudget budget;
   std::optional<int> slabs;
-  /// "centre", "centroid"; none: the centre for one slab, else the centroid
+  /// "centre", "centroid"; none: the centre for one slab, otherwise the centroid
   std::optional<std::string> st_plane;
   std::optional<int> uv_nodes;
   std::optional<int> st_nodes;
-  std::optional<double> st_spacing_mm;     ///< instead: st_nodes follow from the planes' sizes
+  std::optional<double>
+      st_spacing_mm;  ///< instead of st_nodes, which then follow from the planes' sizes
   std::optional<std::string> uv_samples;   ///< "point" or "least-squares"
   std::optional<std::string> tile_filter;  ///< "none" or "neighbours"
   std::optional<std::string> look_up;
   std::optional<std::string> tile_coding;  ///< "plain" or "mean-removed"
-  std::optional<int> mean_step;            ///< of mean-removed tiles, levels
+  std::optional<int> mean_step;            ///< for mean-removed tiles, levels
   std::string caster = "shear-warp";
-  RayCasterOptions ray_caster;  ///< of the trilinear caster
+  RayCasterOptions ray_caster;  ///< for the trilinear caster
   AttenuationModel attenuation;
   std::string material = "all";  ///< or "bone"
 
-  /// Study of measured X-rays that correct the field; empty: none.
+  /// Study of measured X-rays that correct the field. Empty: none.
   std::string projections;
   std::string projections_case;
   double projections_smoothing_px = 0.0;
   std::string projections_common = "keep";  ///< or "remove"
 
   std::optional<int> codewords;
-  std::optional<double> training_fraction;  ///< none: kTrainingTilesPerCodeword decide
+  std::optional<double> training_fraction;  ///< none: kTrainingTilesPerCodeword decides
   std::uint64_t max_training_tiles = TrainingSelection{}.max_training_tiles;
   std::uint64_t seed = 1;
 
-  std::uint64_t memory_limit_bytes = 0;  ///< per rank beside the CT; 0: kDefaultMemoryLimitBytes
+  std::uint64_t memory_limit_bytes = 0;  ///< per rank besides the CT; 0: kDefaultMemoryLimitBytes
   std::string output;
   std::vector<std::string> mpi_io_hints;  ///< KEY=VALUE
   bool is_dry_run = false;
   bool is_restart = false;
   bool has_checkpoint = true;
 
-  /// The range about one pose. UsageError when a text of it does not parse.
+  /// The range about one pose. Throws UsageError when its text does not parse.
   [[nodiscard]] MotionRange range() const;
-  /// Whether an atlas is made, not a field.
+  /// Whether an atlas is made instead of a field.
   [[nodiscard]] bool is_atlas() const { return !orbit.empty() || !orbit_cameras.empty(); }
   /// The parts of the design that are stated.
   [[nodiscard]] DesignParts stated_parts() const;
-  /// The requested preset; without one the default, or the paper's if parts are stated.
+  /// The requested preset. Without one, the default, or the paper's if parts are stated.
   [[nodiscard]] const DesignPreset& design_preset() const;
   /// Whether a probe of the CT has to choose what is not stated.
   [[nodiscard]] bool needs_probe() const;
   /// The design's budget: the stated one, or the preset's.
   [[nodiscard]] const DesignBudget& limits() const;
-  /// The design: of the preset, with the parts that are stated.
+  /// The design: that of the preset, with the stated parts replaced.
   [[nodiscard]] FieldDesign design() const { return stated_parts().over(design_preset().design); }
-  /// These options with `nodes` in place of the spacing on the (s,t) planes.
+  /// These options with `nodes` instead of the spacing on the (s,t) planes.
   [[nodiscard]] PrecomputeOptions with_st_nodes(int nodes) const;
   /// These options with the design stated.
   [[nodiscard]] PrecomputeOptions with_design(const FieldDesign& design) const;
@@ -108,7 +109,7 @@ struct PrecomputeOptions {
   [[nodiscard]] bool is_of_bone() const { return material == "bone"; }
 
   void describe(Fields& field);
-  /// Fills in the design, unless a probe has to choose it, and the rule that places (s,t) planes.
+  /// Fills in the design, unless a probe must choose it, and the rule that places (s,t) planes.
   [[nodiscard]] PrecomputeOptions in_force() const;
 };
 
@@ -118,19 +119,19 @@ inline constexpr int kMostPlaneNodes = 4096;
 /// Default step of the means of mean-removed tiles, in levels of 65535.
 inline constexpr int kDefaultMeanStep = 64;
 
-/// Stages that options decide.
+/// Stages that options can decide.
 inline constexpr const char* kCastingStage = "casting";  ///< the samples, with CT, camera and pose
 inline constexpr const char* kCodebookStage = "codebook";  ///< what is made of them
 
-/// Training tiles where no share is stated: enough that unseen tiles come out nearly as training
-/// tiles do (precompute/README.md has what more and fewer give).
+/// Training tiles where no share is stated: enough that unseen tiles are coded nearly as well as
+/// training tiles (precompute/README.md says what more and fewer give).
 inline constexpr std::uint64_t kTrainingTilesPerCodeword = 64;
 /// The same for least-squares viewpoints, whose casting takes the time that this saves.
 inline constexpr std::uint64_t kFewerTrainingTilesPerCodeword = 32;
 /// Upper limit of that default, so that 65536 codewords take at most twice the time of 16384.
 inline constexpr std::uint64_t kTrainingTilesUnlessStated = std::uint64_t{1} << 20u;
-/// Improvement below which training ends. The paper's single slab keeps the stricter limit,
-/// so that its files stay byte-identical; with several slabs the last iterations gain less than
+/// Training ends below this improvement. The paper's single slab keeps the stricter limit, so that
+/// its files stay byte-identical. With several slabs, the last iterations gain less than
 /// interpolation loses (precompute/README.md).
 double min_improvement_of(const FieldDesign& design);
 

@@ -44,8 +44,8 @@ std::vector<std::size_t> shuffled(std::size_t count) {
   return order;
 }
 
-/// Tiles of sampled units: one run of neighbours to encode, and others, spread over all units, to
-/// draw codewords from.
+/// Tiles of sampled units: one run of neighbours to encode, and others, spread over all units, from
+/// which codewords are drawn.
 struct SampledTiles {
   std::vector<Tile> run;
   std::vector<Tile> spread;
@@ -63,8 +63,8 @@ struct SampledTiles {
   }
 };
 
-/// Every n-th of the spread tiles, or folded shapes where `mean_step` is above 0, so that there are
-/// as many as asked for, if there are enough.
+/// Every n-th of the spread tiles, or folded shapes where `mean_step` is above 0. n is chosen to
+/// give the requested number, if there are enough.
 Codebook drawn_codebook(std::vector<Tile> tiles, int codewords, int mean_step) {
   std::vector<Tile> drawn{Tile{}};
   const std::size_t wanted = static_cast<std::size_t>(codewords) - 1;

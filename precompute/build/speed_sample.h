@@ -12,12 +12,13 @@ namespace af {
 /// How fast one rank works on a field, from short samples of the work itself.
 struct SpeedSample {
   double rays_per_second = 0.0;
-  double occupied_fraction = 0.0;          ///< of the field's tiles: not empty
-  double encode_seconds_per_tile = 0.0;    ///< not empty; a neighbour's codeword as hint
-  double train_seconds_per_tile = 0.0;     ///< and iteration; the tile's own last codeword as hint
-  double codebook_seconds = 0.0;           ///< to prepare a search
-  double compress_seconds_per_byte = 0.0;  ///< of indices (and means) of tiles that are not empty
-  double compressed_fraction = 1.0;        ///< of those indices
+  double occupied_fraction = 0.0;  ///< share of the field's tiles that are not empty
+  double encode_seconds_per_tile =
+      0.0;  ///< for tiles that are not empty; a neighbour's codeword as hint
+  double train_seconds_per_tile = 0.0;  ///< and per iteration; the tile's own last codeword as hint
+  double codebook_seconds = 0.0;        ///< to prepare a search
+  double compress_seconds_per_byte = 0.0;  ///< for indices (and means) of tiles that are not empty
+  double compressed_fraction = 1.0;        ///< for those indices
 };
 
 /// Casts units of a plan in pseudo-random order for about `seconds`, and codes some of their tiles
@@ -28,14 +29,14 @@ SpeedSample sample_speed(const FieldCaster& caster,
                          const PrecomputeOptions& options,
                          double seconds);
 
-/// How fast a folder's disk is, from a nameless file of 16 MiB.
+/// How fast the disk of a folder is, measured with a nameless file of 16 MiB.
 struct DiskSample {
   double write_bytes_per_second = 0.0;  ///< to the disk itself
-  double read_bytes_per_second = 0.0;   ///< past the system's cache, where it lets go
+  double read_bytes_per_second = 0.0;   ///< past the system's cache, if it lets go
   std::uint64_t available_bytes = 0;    ///< left for new files
 };
 
-/// Both 0 when nothing can be written there.
+/// Both speeds are 0 when nothing can be written there.
 DiskSample sample_disk(const std::filesystem::path& folder);
 
 }  // namespace af

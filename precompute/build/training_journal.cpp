@@ -27,7 +27,7 @@ std::optional<TrainedCodebook> training_of(std::span<const std::byte> bytes) {
     auto training = value_of<TrainedCodebook>(bytes, kName);
     if (problems(training.codebook).empty()) return training;
   } catch (const FileError&) {
-    // A record that holds no training is passed over: the training begins anew.
+    // A record that holds no training is skipped, and the training starts over.
   }
   return std::nullopt;
 }

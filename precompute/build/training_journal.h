@@ -14,14 +14,15 @@ namespace af {
 /// The iterations of an unfinished training, in a journal that rank 0 keeps in the progress folder.
 class TrainingJournal {
  public:
-  /// Collective. Opens or creates the journal. Discards iterations made with other options: a
-  /// resumed run may change the codebook and keeps the cast units. Also discards those whose
+  /// Collective. Opens or creates the journal. Discards iterations made with other options, because
+  /// a resumed run may change the codebook and keep the cast units. Also discards those whose
   /// codebook is unusable or has another size or mean step than the options.
   TrainingJournal(UnfinishedWork work,
                   const CodebookOptions& options,
                   const Communicator& communicator);
 
-  /// Result of the last valid iteration of earlier runs, the same on every rank; none without one.
+  /// Result of the last valid iteration of earlier runs, the same on every rank. None if there is
+  /// none.
   [[nodiscard]] const std::optional<TrainedCodebook>& begun() const { return begun_; }
 
   /// Collective. Keeps the training after an iteration.
@@ -33,7 +34,7 @@ class TrainingJournal {
   std::optional<TrainedCodebook> begun_;
 };
 
-/// Restores a training from bytes_of(); nothing when it has no usable codebook.
+/// Restores a training from bytes_of(). Nothing when it has no usable codebook.
 std::optional<TrainedCodebook> training_of(std::span<const std::byte> bytes);
 
 }  // namespace af

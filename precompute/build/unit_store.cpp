@@ -9,7 +9,7 @@ namespace af {
 
 namespace {
 
-/// A unit has two records: of its tiles (bitmap, then tiles) and of its indices.
+/// A unit has two records: one of its tiles (bitmap, then tiles) and one of its indices.
 std::int64_t tiles_key(std::uint32_t unit_id) {
   return 2 * std::int64_t{unit_id};
 }
@@ -18,13 +18,13 @@ std::int64_t indices_key(std::uint32_t unit_id) {
   return 2 * std::int64_t{unit_id} + 1;
 }
 
-/// Stands before a unit's indices.
+/// Precedes a unit's indices.
 struct IndicesHead {
   std::uint64_t squared_error = 0;
   std::uint64_t codebook_crc = 0;
 };
 
-/// The tiles at a place, or nothing when they are damaged or cannot be of this unit.
+/// The tiles at a place, or nothing when they are damaged or cannot belong to this unit.
 std::optional<UnitTiles> read_tiles(const ProgressStore& store,
                                     const RecordPlace& place,
                                     const WorkUnit& unit) {

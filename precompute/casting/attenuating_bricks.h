@@ -11,7 +11,7 @@
 namespace af {
 
 /// Marks where a volume attenuates, in bricks of 2 x 2 x 2 voxels widened by a reach, and tells
-/// whether all voxels around a point are 0. One byte per brick.
+/// whether all voxels around a point are 0. Takes one byte per brick.
 /// \test AttenuatingBricks.NeverMissesAVoxelWithinReach
 class AttenuatingBricks {
  public:

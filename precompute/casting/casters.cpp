@@ -24,7 +24,7 @@ CasterPointer make_shear_warp(const CasterInputs& inputs) {
 
 constexpr PlanOptions kSmallUnits{4096};
 
-/// Every caster there is; a new one joins here.
+/// Every caster. A new one is added here.
 constexpr std::array kCasters = {
     KnownCaster{"trilinear",
                 "the reference, samples along every ray",

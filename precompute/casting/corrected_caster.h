@@ -10,7 +10,7 @@
 
 namespace af {
 
-/// Adds to another caster's line integrals what measured X-rays show beyond the CT. Each depth slab
+/// Adds what measured X-rays show beyond the CT to another caster's line integrals. Each depth slab
 /// gets the part that lies in it. Nodes that are 0 stay 0, and sums are at least 0.
 /// \test CorrectedCaster.*
 class CorrectedFieldCaster final : public FieldCaster {

@@ -11,7 +11,8 @@ namespace af {
 
 namespace {
 
-/// Sums of weights, first and second moments of slices [0, i): gives any run's moments in one step.
+/// Sums of weights, first and second moments of slices [0, i). They give any run's moments in one
+/// step.
 class RunMoments {
  public:
   explicit RunMoments(std::span<const std::int64_t> slice_sums) {
@@ -35,7 +36,7 @@ class RunMoments {
   [[nodiscard]] double centroid(std::size_t begin, std::size_t end) const {
     return (first_[end] - first_[begin]) / weight(begin, end);
   }
-  /// Weighted squared distance from the centroid; infinite for a run that attenuates nothing.
+  /// Weighted squared distance from the centroid. Infinite for a run that attenuates nothing.
   [[nodiscard]] double cost(std::size_t begin, std::size_t end) const {
     if (!(weight(begin, end) > 0.0)) return std::numeric_limits<double>::infinity();
     const double moment = first_[end] - first_[begin];
@@ -62,7 +63,7 @@ std::vector<int> best_slice_cuts(std::span<const std::int64_t> slice_sums, int s
   const std::size_t slices = slice_sums.size();
   const auto slab_count = static_cast<std::size_t>(slabs);
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  // best[i]: least cost of slices [0, i) in k slabs; last_cut[k][i]: where its last slab begins.
+  // best[i]: least cost of slices [0, i) in k slabs. last_cut[k][i]: where its last slab begins.
   std::vector<double> best(slices + 1, kInfinity);
   best[0] = 0.0;
   std::vector<std::vector<std::size_t>> last_cut(slab_count + 1,

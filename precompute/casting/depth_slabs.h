@@ -9,23 +9,24 @@
 
 namespace af {
 
-/// Where a CT is cut into K depth slabs, and the (s,t) plane of each: what make_light_slab() takes.
+/// Where a CT is cut into K depth slabs, and the (s,t) plane of each, as make_light_slab() takes
+/// them.
 struct DepthSlabs {
   std::vector<double> boundaries_y_mm;  ///< K - 1, ascending, midway between two slices
   std::vector<double> st_plane_y_mm;    ///< K, ascending
 };
 
-/// Cuts slices of given attenuation into `slabs` runs, so that the attenuation-weighted mean
-/// squared distance of slices from their slab's centroid is least: the blur of a coarse (u,v) grid
-/// grows with that distance. Returns the first slice of each run except the first. Exact (dynamic
-/// programming, slabs * slices^2 steps). Every slab attenuates; throws InputError when there are
-/// fewer attenuating slices than slabs.
+/// Cuts slices of given attenuation into `slabs` runs such that the attenuation-weighted mean
+/// squared distance of slices from their slab's centroid is least, because the blur of a coarse
+/// (u,v) grid grows with that distance. Returns the first slice of each run except the first. Exact
+/// (dynamic programming, slabs * slices^2 steps). Every slab attenuates. Throws InputError when
+/// there are fewer attenuating slices than slabs.
 /// \test DepthSlabs.CutIsTheBestOfAllCuts
 std::vector<int> best_slice_cuts(std::span<const std::int64_t> slice_sums, int slabs);
 
-/// Where the (s,t) planes stand.
+/// Where the (s,t) planes are placed.
 enum class StPlane {
-  Centre,    ///< all through the field's centre, y = 0: the paper's, for one slab
+  Centre,    ///< all through the field's centre, y = 0, as in the paper, for one slab
   Centroid,  ///< each at its slab's centroid of attenuation
 };
 

@@ -9,10 +9,10 @@
 
 namespace af {
 
-/// The field that a slab belongs to, when the slabs of several fields are numbered consecutively.
+/// The field to which a slab belongs when the slabs of several fields are numbered consecutively.
 struct SlabPlace {
   std::size_t field = 0;
-  std::size_t slab = 0;  ///< of that field
+  std::size_t slab = 0;  ///< within that field
 };
 
 /// The place of every slab, in order. `slab_counts`: number of slabs of each field.

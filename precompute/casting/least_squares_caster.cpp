@@ -47,7 +47,7 @@ class CastSamples {
     caster.cast(unit_, samples_);
   }
 
-  /// Of one viewpoint: [s][t].
+  /// Samples of one viewpoint, [s][t].
   [[nodiscard]] const std::uint16_t* at(int u, int v) const {
     const std::size_t viewpoint =
         static_cast<std::size_t>(u - unit_.u.begin) * static_cast<std::size_t>(unit_.v.count) +
@@ -63,13 +63,13 @@ class CastSamples {
   std::vector<std::uint16_t> samples_;
 };
 
-/// Line integrals of a neighbouring viewpoint and of the place midway to it.
+/// Line integrals of a neighbouring viewpoint, and of the place midway to it.
 struct Cell {
   const std::uint16_t* halfway;
   const std::uint16_t* neighbour;
 };
 
-/// The cells beside a viewpoint along one axis; one alone counts as both.
+/// The cells beside a viewpoint along one axis. A single one counts as both.
 struct Cells {
   Cell before;
   Cell after;

@@ -18,7 +18,7 @@ namespace {
 constexpr int kMostCells = 32;
 /// Sources farther than this share of the circle's radius from its plane are not on a circle.
 constexpr double kMostBeside = 0.1;
-/// Views that look at the CT within this cosine of the field's own direction are used.
+/// Only views that look at the CT within this cosine of the field's own direction are used.
 constexpr double kLeastCosine = 0.2;
 
 Eigen::Vector3d mean_source(std::span<const ResidualView> views) {
@@ -27,8 +27,8 @@ Eigen::Vector3d mean_source(std::span<const ResidualView> views) {
   return sum / static_cast<double>(views.size());
 }
 
-/// Normal of the sources' plane: of the two that span the widest triangle with their mean. Zero
-/// when all lie on a line.
+/// Normal of the sources' plane, from the two sources that span the widest triangle with their
+/// mean. Zero when all lie on a line.
 Eigen::Vector3d plane_normal(std::span<const ResidualView> views, const Eigen::Vector3d& middle) {
   Eigen::Vector3d widest = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < views.size(); ++i)
@@ -111,7 +111,8 @@ void MeasuredResidual::select_views(std::span<const ResidualView> views,
   std::vector<std::pair<double, Projection>> found;
   for (const ResidualView& view : views) {
     const CameraGeometry& camera = view.camera;
-    // Towards the source: neither the circle's middle nor the field's centre need be on the axis.
+    // The direction towards the source. Neither the circle's middle nor the field's centre need be
+    // on the axis.
     const Eigen::Vector3d away = -camera.beam_direction();
     const double out = away.dot(outward);
     if (!(out > kLeastCosine)) continue;
@@ -123,7 +124,7 @@ void MeasuredResidual::select_views(std::span<const ResidualView> views,
     projection.width = camera.size_px.x();
     projection.height = camera.size_px.y();
     projection.residual = view.residual.data();
-    // The tangent of the angle orders as the angle does.
+    // The tangent of the angle has the same order as the angle.
     found.emplace_back(away.dot(tangent) / out, projection);
   }
   std::stable_sort(
@@ -144,7 +145,7 @@ void MeasuredResidual::make_profile(const AttenuationVolume& volume) {
       const std::size_t row =
           (static_cast<std::size_t>(k / side) * cells(1) + static_cast<std::size_t>(j / side)) *
           cells(0);
-      // Sums of at most 16777216 stay exact, and beyond that they are weights still.
+      // Sums of at most 16777216 stay exact. Beyond that they still are weights.
       for (int i = 0; i < grid.size[0]; ++i, ++voxel)
         attenuation_[row + static_cast<std::size_t>(i / side)] +=
             static_cast<float>(volume.voxels()[voxel]);
@@ -205,7 +206,7 @@ double MeasuredResidual::along(const Eigen::Vector3d& viewpoint,
   for (std::size_t i = 0; i < 2; ++i)
     pixels[i] = {views[i]->pixels_from_ct * viewpoint + views[i]->pixels_of_origin,
                  views[i]->pixels_from_ct * direction};
-  // A sample per cell, at the middles of equal steps.
+  // One sample per cell, at the middles of equal steps.
   const double longest = (leave - enter) * cells.change.norm();
   const int samples = std::max(1, static_cast<int>(longest) + 1);
   const double step = (leave - enter) / samples;

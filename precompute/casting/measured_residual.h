@@ -11,40 +11,39 @@
 
 namespace af {
 
-/// A measured X-ray and what it holds beyond the CT.
+/// A measured X-ray, and what it holds beyond the CT.
 struct ResidualView {
   CameraGeometry camera;            ///< in the ct frame, mm
-  std::span<const float> residual;  ///< per pixel, row-major: measured less cast line integrals; 0
-                                    ///< where nothing was measured
+  std::span<const float> residual;  ///< per pixel, row-major: measured minus cast line integrals; 0
 };
 
-/// Why the views cannot come from one orbit of a source about the CT; empty when they can.
+/// Why the views cannot come from one orbit of a source about the CT. Empty when they can.
 std::vector<std::string> orbit_problems(std::span<const ResidualView> views);
 
-/// Predicts, for any ray, what X-rays measured along a circle about the CT show beyond the CT's own
+/// Predicts for any ray what X-rays measured along a circle about the CT show beyond the CT's own
 /// line integral.
 ///
 /// The plane through a ray and parallel to the circle's axis meets the circle between two
 /// neighbouring sources. Both views contribute, with weights linear in the distance along their
 /// chord. Each view assumes that its residual is spread along its own rays as the CT's attenuation
-/// is: it contributes the mean of the residual at the projections of the ray's points, weighted by
+/// is. It contributes the mean of the residual at the projections of the ray's points, weighted by
 /// the attenuation there. A measured ray projects to one pixel and gets that pixel's residual. The
 /// farther a ray is from the circle, the longer the track of its points on the detector, and the
-/// more of the residual's detail averages out. Nothing else limits the reach: there is no width to
-/// choose.
+/// more of the residual's detail averages out. Nothing else limits the reach, so there is no width
+/// to choose.
 ///
-/// Rays that do not have a view on each side, and points that a view does not see, have residual 0.
-/// No value depends on a mathematics library function. \test MeasuredResidual.*
+/// Rays without a view on each side, and points that a view does not see, have residual 0. No value
+/// depends on a mathematics library function. \test MeasuredResidual.*
 class MeasuredResidual {
  public:
-  /// `toward_source`: from the CT to where the field's viewpoints are (ct frame); views on that
-  /// side are used. The residuals must outlive this object. InputError by orbit_problems().
+  /// `toward_source`: from the CT to where the field's viewpoints are (ct frame). Views on that
+  /// side are used. The residuals must outlive this object. Throws InputError by orbit_problems().
   MeasuredResidual(std::span<const ResidualView> views,
                    const AttenuationVolume& volume,
                    const Eigen::Vector3d& toward_source);
 
   /// The residual that belongs to the part [begin, end) of the ray from `viewpoint` through
-  /// `through` (ct frame), as multiples of the way between the two. Parts of a ray sum to the
+  /// `through` (ct frame), as multiples of the distance between the two. Parts of a ray sum to the
   /// whole.
   [[nodiscard]] double along(const Eigen::Vector3d& viewpoint,
                              const Eigen::Vector3d& through,
@@ -64,13 +63,13 @@ class MeasuredResidual {
     int height = 0;
     const float* residual = nullptr;
   };
-  /// The two views beside a ray, and how far it is from the first to the second.
+  /// The two views beside a ray, and the ray's position between them, from the first to the second.
   struct Neighbours {
     const Projection* first;
     const Projection* second;
     double share;
   };
-  /// A ray as linear functions of the multiple of the way from viewpoint to plane.
+  /// A ray as linear functions of the multiple of the distance from viewpoint to plane.
   struct Line {
     Eigen::Vector3d start;
     Eigen::Vector3d change;
@@ -85,7 +84,7 @@ class MeasuredResidual {
 
   std::vector<Projection> views_;  ///< in order around the axis
   Eigen::Vector3d axis_;           ///< of the circle, unit
-  /// The CT's attenuation in cubes of voxels, i fastest: how residuals are spread in depth.
+  /// The CT's attenuation in cubes of voxels, i fastest. Residuals are spread in depth like it.
   std::array<int, 3> cells_{};
   std::vector<float> attenuation_;
   Eigen::Matrix3d cells_from_ct_;

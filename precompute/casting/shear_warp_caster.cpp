@@ -13,8 +13,8 @@ namespace af {
 
 namespace {
 
-/// Most x in the first pass's buffer, each with kShearColumns t nodes: 512 KiB, about half of a
-/// second-level cache.
+/// Most x in the first pass's buffer, each with kShearColumns t nodes. This is 512 KiB, about half
+/// of a second-level cache.
 constexpr int kMostBufferedX = 8192;
 static_assert(kRowBlock == kShearColumns && kRunOfT == kShearColumns,
               "interpolate_columns writes x in whole blocks of what is stored, for a run of t");
@@ -45,15 +45,15 @@ struct Slice {
   int y = 0;
   NodeMap x_of_s;
   NodeMap z_of_t;
-  /// The x that the unit's rays can meet; the first pass computes no others.
+  /// The x that the unit's rays can meet. The first pass computes no others.
   int first_x = 0;
   int last_x = 0;
 };
 
-/// A slice that matters for one run of t nodes, and where it is in the buffer.
+/// A slice that matters for one run of t nodes, and its place in the buffer.
 struct ActiveSlice {
   const Slice* slice = nullptr;
-  int first_x = 0;  ///< of what is in the buffer: a multiple of kRowBlock
+  int first_x = 0;  ///< first x in the buffer, a multiple of kRowBlock
   int low_x = 0;    ///< an x of zeros, or one that no ray reaches
   int high_x = 0;   ///< likewise
   int x_count = 0;
@@ -101,7 +101,7 @@ class UnitCast {
   }
 
  private:
-  /// Room for kMostBufferedX, or for one slice that alone needs more.
+  /// Room for kMostBufferedX, or for a single slice that needs more.
   static std::size_t buffer_values(const SlabAlignedGrid& grid) {
     return static_cast<std::size_t>(std::max(kMostBufferedX, grid.size[0] + 3 * kRowBlock)) *
            kShearColumns;
@@ -151,7 +151,7 @@ class UnitCast {
     write_samples(v, first_t, t_count, is_empty);
   }
 
-  /// What of the slice a run's rays meet; no x when these are only zeros.
+  /// The part of the slice that a run's rays meet. It has no x when these are only zeros.
   [[nodiscard]] ActiveSlice activate(const Slice& slice,
                                      double v_mm,
                                      int first_t,
@@ -176,7 +176,7 @@ class UnitCast {
     active.high_x = std::min(end, slice.last_x);
     if (active.high_x <= active.low_x) return active;
     active.first_x = active.low_x / kRowBlock * kRowBlock;
-    // Up to and including the x after high_x, which is read with a weight of 0.
+    // This includes the x after high_x, which is read with a weight of 0.
     active.x_count = (active.high_x + 1 - active.first_x + kRowBlock) / kRowBlock * kRowBlock;
     fill_columns(slice, v_mm, first_t, t_count, active.columns);
     return active;
@@ -200,9 +200,9 @@ class UnitCast {
       const int row = std::min(fixed >> kWeightBits, grid.size[2] - 2);
       columns.lower[j] = shear_row(slice.y, row);
       columns.upper[j] = shear_row(slice.y, row + 1);
-      for (const ShearRow& of : {columns.lower[j], columns.upper[j]}) {
-        columns.whole_begin = std::max(columns.whole_begin, of.begin);
-        columns.whole_end = std::min(columns.whole_end, of.begin + of.count);
+      for (const ShearRow& stored : {columns.lower[j], columns.upper[j]}) {
+        columns.whole_begin = std::max(columns.whole_begin, stored.begin);
+        columns.whole_end = std::min(columns.whole_end, stored.begin + stored.count);
       }
       // The last row is 0, so at its very edge a weight of all but 1/32768 is as good as 1.
       columns.weight[j] =
@@ -217,7 +217,7 @@ class UnitCast {
             kRowBlock * (row.end_block() - row.first_block())};
   }
 
-  /// Both passes over the active slices.
+  /// Runs both passes over the active slices.
   void add_block() {
     ShearBlock block;
     block.slices = static_cast<std::int32_t>(active_.size());
@@ -239,7 +239,7 @@ class UnitCast {
 
   void add_viewpoint(int u, ShearBlock& block) {
     const double u_mm = light_slab_.u.position_mm(unit_.u.begin + u);
-    // Nodes whose rays meet an x between the zeros of any slice; one more on either side.
+    // Nodes whose rays meet an x between the zeros of any slice, and one more on either side.
     double first = unit_.s.end();
     double last = unit_.s.begin;
     for (std::size_t k = 0; k < active_.size(); ++k) {
@@ -287,7 +287,7 @@ class UnitCast {
     }
   }
 
-  /// The column whose sum is at `position` of an accumulator: of each group of eight columns, the
+  /// The column whose sum is at `position` of an accumulator. Of each group of eight columns, the
   /// first four are in the first half of the accumulator, the others in the second.
   static int column_at(int position) {
     const int half = position / 16;

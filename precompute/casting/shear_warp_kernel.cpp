@@ -68,11 +68,11 @@ AF_KERNEL_INLINE const int16_t* block_of(const int16_t* values, const ShearRow& 
 
 /// 16-bit lanes of one register.
 constexpr int kRegisterShorts = 2 * native::kLanes;
-/// Half the sums of a node: from here on are those of the last four columns of each eight.
+/// Half the sums of a node. From here on are those of the last four columns of each eight.
 constexpr int kHalfOfSums = kShearColumns / 2;
 
-/// Eight columns from `group` on for the places of one register, from x + `first` on. Registers one
-/// by one, because GCC keeps vectors of several in memory.
+/// Eight columns from `group` on for the places of one register, from x + `first` on. Registers are
+/// handled one by one, because GCC keeps vectors of several in memory.
 template <bool kIsStored>
 AF_KERNEL_INLINE void interpolate_block(
     const ShearColumns& columns, int group, int32_t x, int first, native::Register (&block)[8]) {
@@ -88,7 +88,7 @@ AF_KERNEL_INLINE void interpolate_block(
   }
 }
 
-/// Transposes 8 x 8 lanes within each group: rows of x become rows of t.
+/// Transposes 8 x 8 lanes within each group, so that rows of x become rows of t.
 AF_KERNEL_INLINE void transpose_groups(native::Register (&rows)[8]) {
   native::Register pairs[8];
   for (int i = 0; i < 4; ++i) {
@@ -107,9 +107,9 @@ AF_KERNEL_INLINE void transpose_groups(native::Register (&rows)[8]) {
   }
 }
 
-/// Adds all slices of one node s to the sums of the columns of one register: within each group of
-/// eight the first four columns to `low`, the others to `high`. Single registers, because GCC keeps
-/// arrays and emulated vectors that are carried around a loop in memory.
+/// Adds all slices of one node s to the sums of the columns of one register. Within each group of
+/// eight, the first four columns go to `low`, the others to `high`. Uses single registers, because
+/// GCC keeps arrays and emulated vectors that are carried around a loop in memory.
 AF_KERNEL_INLINE void add_slices(const int16_t* columns,
                                  const int32_t* offsets,
                                  const int32_t* weights,
@@ -158,7 +158,7 @@ void interpolate_columns(const ShearColumns& columns,
                          int32_t first_x,
                          int32_t x_count,
                          int16_t* buffer) {
-  // Groups of columns are the outer loop: then few rows at a time are read, each to its end, which
+  // Groups of columns are the outer loop. Few rows at a time are then read, each to its end, which
   // suits memory prefetchers.
   for (int group = 0; group < kShearColumns; group += 8)
     for (int32_t done = 0; done < x_count; done += kShearColumns) {
@@ -197,7 +197,7 @@ void accumulate_nodes(const int16_t* buffer,
       const Ints weight = x & 255;
       native::store(weights + k, (256 - weight) | (weight << 16));
     }
-    // Through memory on purpose: loads that broadcast are cheaper than taking registers apart.
+    // Goes through memory on purpose: loads that broadcast are cheaper than taking registers apart.
     asm volatile("" : : : "memory");
     for (int i = 0; i < kHalfOfSums; i += native::kLanes)
       add_slices(buffer + 2 * i, offsets, weights, block.slices, sums + i, sums + kHalfOfSums + i);

@@ -13,8 +13,8 @@ namespace af {
 
 namespace {
 
-/// Per slab axis: true unless it runs along a voxel axis up to a shift of a few hundredths of a
-/// voxel over the volume.
+/// For each slab axis, true unless it runs along a voxel axis up to a shift of a few hundredths of
+/// a voxel over the volume.
 std::array<bool, 3> resampled_axes(const CtGrid& grid, const RigidTransform& slab_from_ct) {
   constexpr double kLargestSine = 1e-4;
   const Eigen::Matrix3d slab_axes_in_voxels =
@@ -50,14 +50,14 @@ Eigen::Vector3d resampled_spacing(const CtGrid& grid,
   constexpr double kTiltedSpacing = 0.8;
   if (is_tilted(is_resampled)) spacing_mm.y() *= kTiltedSpacing;
   // From slice to slice a ray moves sideways by up to its slope times their distance. Attenuation
-  // is taken to change linearly along that step, so the step must stay within about a voxel.
+  // is assumed to change linearly along that step, so the step must stay within about a voxel.
   constexpr double kLargestRatio = 1.25;
   spacing_mm.y() /= std::ceil(spacing_mm.y() / (kLargestRatio * voxel_mm));
   return spacing_mm;
 }
 
-/// Sums of the filters' absolute taps, multiplied: over slices (RowSampler), over nodes along x and
-/// z (RowSharpener).
+/// The product of the sums of the filters' absolute taps: over slices (RowSampler), and over nodes
+/// along x and z (RowSharpener).
 double filter_gain(const SlabAlignedGrid& grid) {
   constexpr double kSliceGain = 36.0 / 32.0;
   constexpr double kNodeGain = 272.0 / 180.0;
@@ -66,7 +66,7 @@ double filter_gain(const SlabAlignedGrid& grid) {
 }
 
 float scaled_levels(const AttenuationVolume& volume, const SlabAlignedGrid& grid) {
-  // A column of largest levels, one per slice, each times 256, still fits in 31 bits.
+  // A column of largest levels, one per slice, each times 256, must still fit in 31 bits.
   const int largest_level = std::min(std::numeric_limits<std::int16_t>::max() + 0,
                                      std::numeric_limits<std::int32_t>::max() / 256 / grid.size[1]);
   // Rounding to an integer undoes the multiplication by mu.
@@ -92,7 +92,7 @@ SlabAlignedGrid grid_of_spacing(const AttenuationVolume& volume,
   if (!grid.is_resampled[1]) {
     // Attenuation is linear between the CT's planes, so a slanted ray smears each plane by a hat as
     // wide as its sideways step to the next planes: variance 1/6 in units of that step. A slice on
-    // each plane smears nothing; slices offset by d smear by d (1 - d): 1/6 for this d.
+    // each plane smears nothing. Slices offset by d smear by d (1 - d), which is 1/6 for this d.
     constexpr double kSliceShift = 0.21132486540518713;
     grid.origin_mm.y() -= kSliceShift * grid.spacing_mm.y();
   }
@@ -152,7 +152,7 @@ class RowFinder {
   }
 
  private:
-  /// Nodes of a row that are looked at together, from the middle.
+  /// How many nodes of a row are looked at together, from the middle.
   static constexpr int kStep = 4;
 
   /// How far the voxels on which nodes depend lie from the middle of their step. It covers the
@@ -272,7 +272,7 @@ std::vector<std::string> problems(const SlabAlignedOptions& options) {
 
 Eigen::Vector3d SlabAlignedGrid::slice_origin_mm(int slice) const {
   Eigen::Vector3d cells(0.0, slice, 0.0);
-  // Two-dimensional golden ratio: the most evenly spread sequence of this kind.
+  // The two-dimensional golden ratio gives the most evenly spread sequence of this kind.
   const double x = 0.7548776662466927 * slice;
   const double z = 0.5698402909980532 * slice;
   if (is_resampled[0]) cells.x() = x - std::floor(x);
@@ -305,7 +305,7 @@ SlabAlignedLayout slab_aligned_layout(const AttenuationVolume& volume,
                         resampled_spacing(volume.grid(), slab_from_ct, relative_spacing)));
     const double excess = static_cast<double>(layout.bytes()) / static_cast<double>(largest);
     if (excess <= 1.0 || !layout.grid.is_oblique() || relative_spacing >= 1.0) return layout;
-    // Rows end at whole blocks, so that bytes fall a little less than nodes do.
+    // Rows end at whole blocks, so bytes fall a little less than nodes do.
     constexpr double kLeastCoarsening = 1.02;
     relative_spacing *= std::max(kLeastCoarsening, tilted ? std::sqrt(excess) : excess);
     relative_spacing = std::min(relative_spacing, 1.0);

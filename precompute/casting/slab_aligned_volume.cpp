@@ -12,9 +12,9 @@ namespace af {
 
 namespace {
 
-constexpr int kLanes = 16;  ///< of resample_row: rows are whole vectors of so many
+constexpr int kLanes = 16;  ///< of resample_row: rows are whole vectors of this many
 
-/// Samples rows of slices, which are not sharpened yet. Positions are of single precision.
+/// Samples rows of slices, which are not sharpened yet. Positions have single precision.
 class RowSampler {
  public:
   RowSampler(const AttenuationVolume& volume,
@@ -36,8 +36,8 @@ class RowSampler {
     return static_cast<std::size_t>((grid.size[0] + kRowBlock - 1) / kRowBlock) * kRowBlock;
   }
 
-  /// Levels of one row, 0 outside the nodes of `row`; exactly 0 on the grid's faces, whatever
-  /// single precision makes of them.
+  /// Levels of one row, 0 outside the nodes of `row`. They are exactly 0 on the grid's faces,
+  /// whatever single precision makes of them.
   void sample(int y, int z, const GridRow& row, std::int16_t* levels) {
     std::fill_n(levels, row_stride(grid_), std::int16_t{0});
     if (row.begin == row.end) return;
@@ -55,10 +55,10 @@ class RowSampler {
     std::int32_t weight;  ///< in 1/32
   };
 
-  /// A sum over slices equals their integral except for content that oscillates once or more per
+  /// A sum over slices equals their integral, except for content that oscillates once or more per
   /// slice. Voxels oblique to the slices have such content: interpolation keeps a few per cent of
   /// the texture at that frequency. The half-band filter [-1 0 9 16 9 0 -1] / 32 at steps of half a
-  /// slice is 0 there to fourth order, and 1 to fourth order for the slow changes along y that
+  /// slice is 0 there to fourth order. It is 1 to fourth order for the slow changes along y that
   /// slanted rays see.
   void sample_mean(int y, int z, const GridRow& row, std::int16_t* levels) {
     constexpr std::array<Tap, 5> kTaps = {
@@ -104,16 +104,17 @@ class RowSampler {
       kernels_128::resample_row, kernels_256::resample_row, kernels_512::resample_row);
 };
 
-/// Interpolating between samples linearly smooths: averaged over the positions of the nodes it is a
-/// convolution with a hat, whose transform is sinc^2 = 1 - w^2/12 + w^4/360 - ... The filter
-/// [2 -23 222 -23 2] / 180 has the inverse series up to w^4, so that the two together smooth only
-/// in sixth order. It acts along resampled axes alone. Faces stay 0.
+/// Linear interpolation between samples smooths. Averaged over the positions of the nodes, it is a
+/// convolution with a hat, whose transform is sinc^2 = 1 - w^2/12 + w^4/360 - ... The filter [2 -23
+/// 222 -23 2] / 180 has the inverse series up to w^4, so that both together smooth only in sixth
+/// order. It acts along resampled axes alone. Faces stay 0.
 class RowSharpener {
  public:
   explicit RowSharpener(const SlabAlignedGrid& grid)
       : grid_(grid), stride_(RowSampler::row_stride(grid)), along_z_(stride_) {}
 
-  /// Nodes [begin, end) of row z; `slice` holds all its rows, `sharpened` points to x = 0.
+  /// Sharpens nodes [begin, end) of row z. `slice` holds all its rows, and `sharpened` points to x
+  /// = 0.
   void sharpen(const std::int16_t* slice, int z, int begin, int end, std::int16_t* sharpened) {
     const int reach_x = grid_.is_resampled[0] ? kNodeFilterReach : 0;
     const int reach_z = grid_.is_resampled[2] ? kNodeFilterReach : 0;
@@ -127,7 +128,7 @@ class RowSharpener {
     for (int x = begin; x < end; ++x) {
       const std::int32_t* at = along_z_.data() + x;
       const auto sum = static_cast<float>(reach_x > 0 ? filtered(at, 1) : kUnity * *at);
-      // Rounds half away from zero.
+      // This rounds half away from zero.
       const float half = sum < 0.0f ? -0.5f : 0.5f;
       const auto level = static_cast<std::int16_t>(sum * kNormalization + half);
       // A node that did not attenuate must not attenuate now, so that the sums of rays beside the
@@ -145,7 +146,7 @@ class RowSharpener {
            2 * (level[-2 * step] + level[2 * step]);
   }
 
-  /// Levels that are filtered twice reach 2^15 * 180^2 at most; scaled_levels() ensures this.
+  /// Levels that are filtered twice reach at most 2^15 * 180^2, which scaled_levels() ensures.
   void filter_along_z(const std::int16_t* levels, int begin, int end) {
     const auto stride = static_cast<std::ptrdiff_t>(stride_);
     std::int32_t* out = along_z_.data();
@@ -168,7 +169,7 @@ void narrow(GridRow& row, const std::int16_t* values) {
   if (row.begin == row.end) row.begin = row.end = 0;
 }
 
-/// Resamples a part of the slices. `values` and `rows` are those of the whole layout; rows of the
+/// Resamples a part of the slices. `values` and `rows` are those of the whole layout. Rows of the
 /// slices are narrowed to their nodes that are not 0.
 void fill_slices(const AttenuationVolume& volume,
                  const RigidTransform& slab_from_ct,
@@ -255,10 +256,10 @@ std::vector<std::int64_t> SlabAlignedVolume::slice_sums() const {
   std::vector<std::int64_t> sums(static_cast<std::size_t>(grid_.size[1]), 0);
   for (int y = 0; y < grid_.size[1]; ++y)
     for (int z = 0; z < grid_.size[2]; ++z) {
-      const GridRow& of = row(y, z);
-      const std::int16_t* levels = values() + of.origin_offset();
+      const GridRow& stored = row(y, z);
+      const std::int16_t* levels = values() + stored.origin_offset();
       std::int64_t sum = 0;
-      for (int x = of.begin; x < of.end; ++x) sum += levels[x];
+      for (int x = stored.begin; x < stored.end; ++x) sum += levels[x];
       sums[static_cast<std::size_t>(y)] += sum;
     }
   return sums;

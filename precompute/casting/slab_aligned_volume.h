@@ -12,7 +12,7 @@
 
 namespace af {
 
-/// Fills a part of a resampled volume's memory; parts may be filled at the same time.
+/// Fills a part of a resampled volume's memory. Parts may be filled concurrently.
 using SlabAlignedFill = std::function<void(std::span<std::byte> memory, int part, int parts)>;
 
 /// Provides memory of `bytes` bytes and has it filled: by one call (memory, 0, 1), or by the ranks
@@ -20,11 +20,11 @@ using SlabAlignedFill = std::function<void(std::span<std::byte> memory, int part
 using SlabAlignedMemory =
     std::function<std::shared_ptr<const std::byte>(std::size_t bytes, const SlabAlignedFill& fill)>;
 
-/// A volume resampled to the slab frame: what the shear-warp caster reads. 2 bytes per stored node.
-/// \test SlabAlignedVolume.HoldsMeansOfTwoVoxelsWhenAxesAgree
+/// A volume resampled to the slab frame, as the shear-warp caster reads it. Takes 2 bytes per
+/// stored node. \test SlabAlignedVolume.HoldsMeansOfTwoVoxelsWhenAxesAgree
 class SlabAlignedVolume {
  public:
-  /// In memory of this process.
+  /// Lies in memory of this process.
   SlabAlignedVolume(const AttenuationVolume& volume,
                     const RigidTransform& slab_from_ct,
                     const SlabAlignedOptions& options = {});
@@ -38,11 +38,12 @@ class SlabAlignedVolume {
   [[nodiscard]] const SlabAlignedGrid& grid() const { return grid_; }
   /// The stored blocks of all rows.
   [[nodiscard]] const std::int16_t* values() const { return values_.data(); }
-  /// A row; its begin and end bound the values that are not 0.
+  /// A row. Its begin and end bound the values that are not 0.
   [[nodiscard]] const GridRow& row(int y, int z) const { return rows_[grid_.row_index(y, z)]; }
   [[nodiscard]] std::int16_t level(int x, int y, int z) const {
-    const GridRow& of = row(y, z);
-    return x < of.begin || x >= of.end ? std::int16_t{0} : values()[of.origin_offset() + x];
+    const GridRow& stored = row(y, z);
+    return x < stored.begin || x >= stored.end ? std::int16_t{0}
+                                               : values()[stored.origin_offset() + x];
   }
   [[nodiscard]] std::size_t bytes() const {
     return values_.view().size_bytes() + rows_.view().size_bytes();

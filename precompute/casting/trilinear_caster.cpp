@@ -33,8 +33,8 @@ void TrilinearFieldCaster::cast(const WorkUnit& unit, std::span<std::uint16_t> s
     for (int v = unit.v.begin; v < unit.v.end(); ++v) {
       run.source_point = ct_from_slab_ * light_slab_.viewpoint(u, v);
       for (int s = unit.s.begin; s < unit.s.end(); ++s)
-        // One fan per run of nodes, placed by the lattice itself. Fans that depended on the plan
-        // would round their points differently.
+        // There is one fan per run of nodes, placed by the lattice itself. Fans that depended on
+        // the plan would round their points differently.
         for (int t = unit.t.begin; t < unit.t.end(); t += kRunOfT) {
           run.columns = std::min(kRunOfT, unit.t.end() - t);
           run.first_point = ct_from_slab_ * light_slab_.st_point(slab, s, t);

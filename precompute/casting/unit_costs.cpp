@@ -15,7 +15,7 @@ double covered_fraction(const NodeRange& range, double low, double high) {
   return std::clamp(covered / range.count, 0.0, 1.0);
 }
 
-/// The part of a unit's nodes that the box's shadow, as seen from one viewpoint, covers.
+/// The part of a unit's nodes that the box's shadow covers, as seen from one viewpoint.
 double shadow_fraction(const WorkUnit& unit,
                        const SlabGeometry& slab,
                        const Eigen::Vector3d& viewpoint,

@@ -9,9 +9,9 @@
 
 namespace af {
 
-/// The cost of casting each unit, in units of one ray through the whole CT, for handing out the
-/// costly units first. Rays that miss the box of all attenuation (`attenuating_corners_ct`, ct
-/// frame) cost little, and a thin slab costs less, because fewer slices are summed.
+/// The cost of casting each unit, relative to one ray through the whole CT, so that costly units
+/// can be handed out first. Rays that miss the box of all attenuation (`attenuating_corners_ct`, ct
+/// frame) cost little. A thin slab costs less, because fewer slices are summed.
 std::vector<double> unit_costs(const std::vector<WorkUnit>& units,
                                const LightSlab& light_slab,
                                const std::array<Eigen::Vector3d, 8>& attenuating_corners_ct);

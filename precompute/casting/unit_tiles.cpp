@@ -11,7 +11,7 @@ namespace af {
 
 namespace {
 
-/// The eight rows of samples that a row of tiles along t is made of, in the order of tile_element.
+/// The eight rows of samples that form a row of tiles along t, in the order of tile_element.
 using SampleRows = std::array<const std::uint16_t*, 8>;
 
 SampleRows rows_of_tiles(const WorkUnit& unit,
@@ -67,7 +67,8 @@ UnitTiles make_unit_tiles(const WorkUnit& unit, std::span<const std::uint16_t> s
     result.occupied[local_tile / 64] |= std::uint64_t{1} << (local_tile % 64);
     ++count;
   });
-  // Tiles are counted first: a vector that grows would take three times the memory for a while.
+  // Tiles are counted first, because a growing vector would temporarily take three times the
+  // memory.
   result.tiles.reserve(count);
   for_each_occupied_tile(
       unit, samples, [&](std::size_t, const Tile& tile) { result.tiles.push_back(tile); });

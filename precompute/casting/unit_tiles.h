@@ -31,11 +31,11 @@ struct UnitTiles {
   }
 };
 
-/// Gathers the samples of a unit, [u][v][s][t], into tiles; odd sizes are padded by replicating the
+/// Gathers the samples of a unit, [u][v][s][t], into tiles. Odd sizes are padded by replicating the
 /// last node.
 UnitTiles make_unit_tiles(const WorkUnit& unit, std::span<const std::uint16_t> samples);
 
-/// Why the tiles cannot belong to the unit (sizes, bits beyond the last tile); empty when they can.
+/// Why the tiles cannot belong to the unit (sizes, bits beyond the last tile). Empty when they can.
 std::vector<std::string> problems(const UnitTiles& tiles, const WorkUnit& unit);
 
 }  // namespace af

@@ -10,8 +10,8 @@
 
 namespace af {
 
-/// Units begin at multiples of this along t, counted from the slab's first stored node: casters
-/// work on such runs.
+/// Units begin at multiples of this along t, counted from the slab's first stored node, because
+/// casters work on such runs.
 inline constexpr int kRunOfT = 32;
 
 /// The unit of work and of restart: one slab x an even-aligned rectangle of viewpoints x an
@@ -42,14 +42,14 @@ struct WorkUnit {
 /// "unit 3 of 32 (slab 0, viewpoints u 0 to 7, v 2 to 3)".
 std::string name_of(const WorkUnit& unit, std::size_t units);
 
-/// Where a unit's tiles stand in the field.
+/// Where a unit's tiles lie in the field.
 class TilePlaces {
  public:
   TilePlaces(const FieldLattice& lattice, const WorkUnit& unit);
 
   /// The unit's first tile in the slab's [Tu][Tv][Ts][Tt] array.
   [[nodiscard]] const std::array<int, 4>& first() const { return first_; }
-  /// Number of a tile over all slabs; `local_tile` counts within the unit, [u][v][s][t]. Random
+  /// Number of a tile over all slabs. `local_tile` counts within the unit, [u][v][s][t]. Random
   /// choices are keyed by it.
   [[nodiscard]] std::int64_t global_index(std::size_t local_tile) const;
 

@@ -9,7 +9,7 @@
 
 namespace af {
 
-/// How the ranks that train one codebook combine their results; the algorithms never see MPI. All
+/// How the ranks that train one codebook combine their results. The algorithms never see MPI. All
 /// ranks call in the same order.
 struct CodebookReduction {
   /// Exact element-wise sums over the ranks, in place.

@@ -13,7 +13,8 @@ namespace af {
 
 namespace {
 
-/// One rank's share of an iteration; adding shares is exact. One array, so that one reduction does.
+/// One rank's share of an iteration; adding shares is exact. It is one array, so that one reduction
+/// is enough.
 class CentroidSums {
  public:
   explicit CentroidSums(std::size_t codewords)
@@ -44,7 +45,7 @@ class CentroidSums {
   std::vector<std::uint64_t> values_;
 };
 
-/// Tiles of one kind with the codeword that codes each.
+/// Tiles of one kind, with the codeword that codes each.
 struct CodedTiles {
   const std::vector<NumberedTile>& tiles;
   std::vector<std::uint32_t> nearest;
@@ -53,7 +54,8 @@ struct CodedTiles {
   explicit CodedTiles(const std::vector<NumberedTile>& numbered)
       : tiles(numbered), nearest(numbered.size(), 0), squared_errors(numbered.size(), 0) {}
 
-  /// Piece by piece: the search takes tiles only, and a copy of all tiles would cost memory.
+  /// Encodes piece by piece: the search takes tiles only, and a copy of all tiles would cost
+  /// memory.
   void encode(const NearestCodeword& search, SearchHint hint) {
     constexpr std::size_t kPiece = 4096;
     std::vector<Tile> piece;
@@ -147,14 +149,14 @@ class CodebookUpdate {
   }
 
   /// Collective. Replaces codewords that are unused or equal to a lower one by the worst-coded
-  /// training tiles; returns how many.
+  /// training tiles. Returns how many.
   std::uint64_t repair(const CodedTiles& coded, const CodebookReduction& reduction) {
     if (free_.empty()) return 0;
     std::vector<std::uint64_t> keys;
     keys.reserve(coded.squared_errors.size());
     for (const std::uint64_t error : coded.squared_errors) keys.push_back(~error);
     static_assert(kNeverPicked == ~std::uint64_t{0}, "a tile without error repairs nothing");
-    // Some are to spare: a tile may equal another one or a centroid.
+    // Some are spare, because a tile may equal another one or a centroid.
     const auto worst = smallest_keyed_tiles(keys, coded.tiles, 2 * free_.size() + 16, reduction);
     std::set<Tile> taken;
     for (const TrackedCodeword& codeword : codewords_) taken.insert(codeword.tile);
@@ -228,7 +230,7 @@ class CodebookIterations {
   const CodebookReduction& reduction_;
 };
 
-/// Why to stop: another iteration would not pay, or is not allowed. None: go on.
+/// Why to stop: another iteration would not pay, or is not allowed. None: continue.
 std::optional<TrainingStop> reason_to_stop(const TrainedCodebook& training,
                                            const CodebookOptions& options) {
   const std::size_t done = training.iterations.size();

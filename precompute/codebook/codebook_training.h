@@ -14,11 +14,11 @@
 namespace af {
 
 struct CodebookOptions {
-  int codewords = 16384;  ///< with the zero tile
+  int codewords = 16384;  ///< including the zero tile
   int max_iterations = 12;
-  double min_relative_improvement = 0.005;  ///< of the training tiles' squared error
+  double min_relative_improvement = 0.005;  ///< in the training tiles' squared error
   std::uint64_t seed = 1;
-  int mean_step = 0;  ///< of a field whose tiles have means (mean_removal.h); 0: plain tiles
+  int mean_step = 0;  ///< for a field whose tiles have means (mean_removal.h); 0: plain tiles
 };
 
 std::vector<std::string> problems(const CodebookOptions& options);
@@ -27,7 +27,8 @@ std::vector<std::string> problems(const CodebookOptions& options);
 struct TrainingIteration {
   std::uint64_t training_squared_error = 0;
   std::uint64_t held_out_squared_error = 0;
-  std::uint64_t codewords_repaired = 0;  ///< unused or equal ones replaced by the worst-coded tiles
+  std::uint64_t codewords_repaired =
+      0;  ///< unused or equal ones, replaced by the worst-coded tiles
 
   auto members() {
     return std::tie(training_squared_error, held_out_squared_error, codewords_repaired);
@@ -39,7 +40,7 @@ enum class TrainingStop { ImprovementBelowLimit, MaxIterations };
 const char* to_string(TrainingStop stop);
 
 struct TrainedCodebook {
-  Codebook codebook;  ///< of the size asked for, sorted, codeword 0 the zero tile
+  Codebook codebook;  ///< of the requested size, sorted, codeword 0 is the zero tile
   std::uint64_t training_tiles = 0;
   std::uint64_t held_out_tiles = 0;
   std::vector<TrainingIteration> iterations;
@@ -53,22 +54,23 @@ struct TrainedCodebook {
 
 /// Where an interrupted training continues.
 struct TrainingCheckpoints {
-  /// The last state that an earlier run, on any number of ranks, gave to on_iteration(); none: from
+  /// The last state that an earlier run, on any number of ranks, gave to on_iteration(). None: from
   /// the start. The same tiles and options give the same codebook as a training without a stop.
   std::optional<TrainedCodebook> begun;
-  /// Called on every rank after every iteration; when it throws, it must on all ranks.
+  /// Called on every rank after every iteration. When it throws, it must throw on all ranks.
   std::function<void(const TrainedCodebook& so_far)> on_iteration;
 };
 
 /// Collective. Trains a codebook by the generalised Lloyd algorithm (Sec. II-D) on the shares of
 /// all ranks: plain tiles, or folded shapes (remove_means()) where the options have a step. Sums,
-/// counts and errors are exact integers and centroids are rounded to levels, so the codebook is the
-/// same on any number of ranks and on any vector width. Codeword 0 is and stays the zero tile.
-/// Initial codewords are distinct tiles drawn by weighted_sampling_key(); codewords that end up
-/// unused or equal to another are replaced by the worst-coded training tiles. Only when there are
-/// no such tiles left do equal codewords remain (the higher ones are then never used), so the size
-/// is always the one asked for. InputError when there are fewer distinct training tiles than
-/// codewords to draw. \test CodebookTraining.IsBitIdenticalOnAnyRankCount
+/// counts and errors are exact integers, and centroids are rounded to levels, so the codebook is
+/// the same on any number of ranks and for any vector width.
+/// Codeword 0 is and stays the zero tile. Initial codewords are distinct tiles drawn by
+/// weighted_sampling_key(). Codewords that end up unused or equal to another are replaced by the
+/// worst-coded training tiles. Equal codewords remain only when no such tiles are left (the higher
+/// ones are then never used), so the size is always the requested one. Throws InputError when there
+/// are fewer distinct training tiles than codewords to draw. \test
+/// CodebookTraining.IsBitIdenticalOnAnyRankCount
 TrainedCodebook train_codebook(const TrainingShare& mine,
                                const CodebookOptions& options,
                                const CodebookReduction& reduction,

@@ -18,18 +18,19 @@ namespace af {
 
 namespace {
 
-/// Many, and of each only a share of its tiles: neighbouring tiles say much the same, and few
-/// patches leave it to chance which edges of the body they see. With 24 whole ones other places
-/// moved the worst DRR of a skull by 4.5 dB, with these by 1.7, in about the same time.
+/// There are many patches, and of each only a share of its tiles is used. Neighbouring tiles say
+/// much the same, and few patches leave it to chance which edges of the body they see. With 24
+/// whole patches, other places moved the worst DRR of a skull by 4.5 dB; with these by 1.7, in
+/// about the same time.
 constexpr std::size_t kPatches = 72;
 constexpr int kTilesPerFittedTile = 3;
 constexpr int kPatchViewpoints = 12;
 constexpr int kPatchNodesAlongS = 16;
-/// Fewer than the sums have room for.
+/// There must be fewer than the sums have room for.
 static_assert(kPatches * (kPatchViewpoints / 2) * (kPatchViewpoints / 2) * (kPatchNodesAlongS / 2) *
                   (kRunOfT / 2) / kTilesPerFittedTile <
               std::size_t{1} << 17);
-/// Fewer tiles for each weight of a coefficient would fit their own noise.
+/// With fewer tiles for each weight of a coefficient, the weights would fit their own noise.
 constexpr std::uint64_t kFewestTiles = 16 * kFilterInputs;
 
 /// A random even-aligned part of what is stored along an axis.
@@ -50,7 +51,7 @@ IntegerCoefficients exact(const TileCoefficients& coefficients) {
   return integers;
 }
 
-/// The tiles of a patch as they will be decoded, and what that loses of them.
+/// The tiles of a patch as they will be decoded, and what is lost by that.
 class Patch {
  public:
   Patch(const WorkUnit& unit,
@@ -83,8 +84,8 @@ class Patch {
     });
   }
 
-  /// Calls visit(tile along each axis, its number) for those to fit that are not empty and whose
-  /// neighbours are known.
+  /// Calls visit(tile along each axis, its number) for those to fit: tiles that are not empty, and
+  /// whose neighbours are known.
   template <typename Visit>
   void for_each_fitted(Visit&& visit) const {
     std::array<int, 4> tile{};
@@ -110,7 +111,7 @@ class Patch {
   }
 
  private:
-  /// Spread evenly along every axis, wherever the patch was taken from.
+  /// Fitted tiles are spread evenly along every axis, wherever the patch was taken from.
   [[nodiscard]] bool is_fitted(const std::array<int, 4>& tile) const {
     const int steps = std::accumulate(tile.begin(), tile.end(), 0) +
                       std::accumulate(first_tile_.begin(), first_tile_.end(), 0);
@@ -125,8 +126,8 @@ class Patch {
 
   std::array<int, 4> counts_;
   std::array<int, 4> first_tile_{};  ///< of the patch, among those stored
-  std::array<bool, 4> begins_{};     ///< with the first stored node
-  std::array<bool, 4> ends_{};       ///< with the last
+  std::array<bool, 4> begins_{};     ///< whether it begins with the first stored node
+  std::array<bool, 4> ends_{};       ///< whether it ends with the last
   std::vector<IntegerCoefficients> decoded_;
   std::vector<IntegerCoefficients> errors_;
   std::vector<bool> is_empty_;
@@ -157,9 +158,9 @@ class Neighbourhood {
   std::array<const IntegerCoefficients*, 81> tiles_{};
 };
 
-/// How many neighbours an input sums, of each input. A filter keeps what is constant as it is: of
-/// coefficient 0 it knows only how far its neighbours differ from it, so that the sums have the
-/// tile's own taken off as often.
+/// How many neighbours each input sums. A filter keeps constants as they are: for coefficient 0 it
+/// uses only how far its neighbours differ from it. The tile's own coefficient is therefore
+/// subtracted as often from the sums.
 constexpr std::array<std::int32_t, kFilterInputs> kSummed = [] {
   std::array<std::int32_t, kFilterInputs> summed{};
   for (std::size_t a = 0; a < 4; ++a) {
@@ -169,7 +170,7 @@ constexpr std::array<std::int32_t, kFilterInputs> kSummed = [] {
   return summed;
 }();
 
-/// Inputs of a coefficient, and the error that they are to predict.
+/// Inputs of a coefficient, and the error that they predict.
 constexpr std::size_t kFitted = kFilterInputs + 1;
 /// Products of these with one another, on and above the diagonal.
 constexpr std::size_t kSumsPerCoefficient = kFitted * (kFitted + 1) / 2;
@@ -215,7 +216,7 @@ CoefficientFit fit_coefficient(std::span<const std::uint64_t> sums) {
   const Eigen::VectorXd with_error = all.col(kSize).head(kSize);
   CoefficientFit fit;
   fit.squared_error = all(kSize, kSize);
-  // Inputs differ in size by far more than in worth; one that is always 0 gets no weight.
+  // Inputs differ in size by far more than in worth. One that is always 0 gets no weight.
   Eigen::VectorXd scale = products.diagonal().cwiseSqrt();
   for (double& size : scale) size = size > 0.0 ? 1.0 / size : 0.0;
   Eigen::MatrixXd scaled = scale.asDiagonal() * products * scale.asDiagonal();

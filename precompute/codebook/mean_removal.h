@@ -9,9 +9,9 @@
 
 namespace af {
 
-/// A tile as its mean, rounded to a multiple of the step, and its shape: what is left, kShapeZero
-/// higher and folded (folded_shape()), so that shapes can be trained and searched as plain tiles
-/// are.
+/// A tile as its mean, rounded to a multiple of the step, and its shape. The shape is what is left,
+/// kShapeZero higher and folded (folded_shape()), so that shapes can be trained and searched like
+/// plain tiles.
 struct MeanRemovedTile {
   std::uint16_t mean = 0;  ///< levels
   Tile shape{};
@@ -20,7 +20,7 @@ struct MeanRemovedTile {
 /// `mean_step`: 1 ... kMaxMeanStep levels.
 MeanRemovedTile remove_mean(const Tile& tile, int mean_step);
 
-/// In place, tiles to shapes; nothing when `mean_step` is 0.
+/// Turns tiles into shapes in place. Does nothing when `mean_step` is 0.
 void remove_means(std::span<NumberedTile> tiles, int mean_step);
 void remove_means(TrainingShare& share, int mean_step);
 

@@ -14,7 +14,7 @@ namespace af {
 namespace {
 
 constexpr std::size_t kBlockCodewords = 16;
-// Farther than any tile, and its square is still a float.
+// Farther than any tile, but its square is still a float.
 constexpr float kFarAway = 1e18f;
 /// A box has 16 children.
 constexpr int kHalvingsOfBox = 4;
@@ -34,7 +34,7 @@ CodewordBox far_box() {
 struct NearestCodeword::Part {
   std::span<std::uint32_t> codewords;
   int halvings = 0;          ///< between it and the root
-  std::uint32_t number = 0;  ///< among the parts of as many halvings
+  std::uint32_t number = 0;  ///< among the parts with as many halvings
 };
 
 NearestCodeword::NearestCodeword(const Codebook& codebook) : mean_step_(codebook.mean_step) {

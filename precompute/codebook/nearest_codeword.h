@@ -11,7 +11,7 @@
 
 namespace af {
 
-/// Where the search for a tile gets its first guess. Affects only speed.
+/// Where the search for a tile gets its first guess. This affects only speed.
 enum class SearchHint {
   None,     ///< none: the first codewords compared are nearer than a neighbour's answer
   PerTile,  ///< the caller's guess, for example the answer of the last training iteration
@@ -19,15 +19,16 @@ enum class SearchHint {
 
 /// Exact nearest-codeword search (squared Euclidean distance of 16 levels; ties take the lowest
 /// index). Tiles and codewords are compared in the coordinates of the 4-D Hadamard transform, whose
-/// first coefficient (DC) orders the codebook: blocks of 16 codewords are visited outwards from the
-/// tile's DC until the DC alone is farther than the best; a block is left after five coefficients
-/// if all 16 are farther. Sums below 2^24 are exact as floats and decide; larger ones only discard,
-/// with a margin above their rounding, and integers decide. So the answer equals brute force on
-/// every vector width. \test NearestCodeword.EqualsBruteForceOnEveryWidth
+/// first coefficient (DC) orders the codebook. Blocks of 16 codewords are visited outwards from the
+/// tile's DC until the DC alone is farther than the best. A block is left after five coefficients
+/// if all 16 are farther.
+/// Sums below 2^24 are exact as floats, and decide. Larger ones only discard, with a margin above
+/// their rounding, and integers decide. The answer therefore equals brute force for every vector
+/// width. \test NearestCodeword.EqualsBruteForceOnEveryWidth
 ///
 /// Shapes have no coefficient as informative as the DC of plain tiles. A balanced tree halves them
 /// at the median of the coefficient that varies most, down to blocks of 16. The ranges of eight
-/// coefficients in each part bound the distance of its codewords; parts are visited nearest first
+/// coefficients in each part bound the distance of its codewords. Parts are visited nearest first
 /// (of the last ones, only the first of 16), until none can hold a nearer codeword.
 class NearestCodeword {
  public:
@@ -36,8 +37,8 @@ class NearestCodeword {
 
   [[nodiscard]] int mean_step() const { return mean_step_; }  ///< of the codebook
 
-  /// Index of the nearest codeword and squared error of every tile. With SearchHint::PerTile
-  /// `nearest` holds valid indices on entry. Re-entrant.
+  /// Finds the index of the nearest codeword and the squared error of every tile. With
+  /// SearchHint::PerTile, `nearest` holds valid indices on entry. Re-entrant.
   void search(std::span<const Tile> tiles,
               SearchHint hint,
               std::span<std::uint32_t> nearest,
@@ -53,7 +54,7 @@ class NearestCodeword {
   void set_box(const Part& child);
 
   int mean_step_;
-  // As in CodewordBlocks.
+  // Arrays as in CodewordBlocks.
   std::vector<Tile> codewords_;
   std::vector<float> coefficients_;
   std::vector<std::uint32_t> indices_;

@@ -8,13 +8,14 @@ namespace af::AF_KERNEL_NAMESPACE {
 
 namespace {
 
-/// Sixteen lanes in the registers of one width: GCC keeps vectors of several registers in memory.
+/// Sixteen lanes in the registers of one width, because GCC keeps vectors of several registers in
+/// memory.
 struct Lanes {
   native::Floats part[16 / native::kLanes];
 };
 constexpr int kParts = 16 / native::kLanes;
 
-/// Bits of the lanes that are no greater than a limit.
+/// One bit per lane: whether it is no greater than a limit.
 AF_KERNEL_INLINE uint32_t bits_within(const Lanes& lanes, float limit) {
   uint32_t bits = 0;
   for (int i = 0; i < kParts; ++i)
@@ -30,7 +31,7 @@ AF_KERNEL_INLINE void set_lane(Lanes& lanes, uint32_t lane, float value) {
   }
 }
 
-/// Exact: 16 squares below 2^32 each.
+/// The result is exact: 16 squares below 2^32 each.
 AF_KERNEL_INLINE uint64_t squared_error(const uint16_t* a, const uint16_t* b) {
   uint64_t sum = 0;
   for (int i = 0; i < 16; ++i) {
@@ -41,7 +42,7 @@ AF_KERNEL_INLINE uint64_t squared_error(const uint16_t* a, const uint16_t* b) {
   return sum;
 }
 
-/// Sums of lanes whose numbers differ in bit `kStride`, and differences in those that have it.
+/// Sums of lanes whose numbers differ in bit `kStride`. Lanes that have the bit get differences.
 template <int kStride>
 AF_KERNEL_INLINE void butterfly(Lanes& values) {
   if constexpr (kStride >= native::kLanes) {
@@ -61,8 +62,8 @@ AF_KERNEL_INLINE void butterfly(Lanes& values) {
   }
 }
 
-/// 4-D Hadamard transform of a tile, its coefficients in the order stated; integers below 2^21,
-/// exact as floats.
+/// 4-D Hadamard transform of a tile, with its coefficients in the stated order. They are integers
+/// below 2^21, and so exact as floats.
 template <const uint32_t (&kOrder)[16]>
 AF_KERNEL_INLINE void hadamard(const uint16_t* tile, float* coefficients) {
   Lanes values;
@@ -86,13 +87,13 @@ struct Best {
 /// A sum of squares of exact differences of integers is exact as a float while it stays below 2^24,
 /// in any order of summation.
 constexpr float kExactBelow = 0x1.0p24f;
-/// Greater than any sum of a codeword, less than those of the padding and of the guards.
+/// Greater than any sum of a codeword, and less than those of the padding and of the guards.
 constexpr float kNoLimit = 1e30f;
 constexpr Best kNothing{~uint64_t{0}, ~uint32_t{0}, kNoLimit};
 
 AF_KERNEL_INLINE float limit_of(uint64_t error) {
   // The transform scales squared distances by 16. A float sum of 16 squares of exact differences
-  // errs by less than 17 * 2^-24 of itself; 2^-18 = 64 * 2^-24 covers that and this product.
+  // errs by less than 17 * 2^-24 of itself, and 2^-18 = 64 * 2^-24 covers that and this product.
   return static_cast<float>(16 * error) * (1.0f + 0x1.0p-18f);
 }
 
@@ -101,7 +102,7 @@ AF_KERNEL_INLINE Best guessed(const CodewordBlocks& blocks, const uint16_t* tile
   return {error, index, limit_of(error)};
 }
 
-/// Ties take the lowest index.
+/// Offers a candidate. Ties take the lowest index.
 AF_KERNEL_INLINE void offer(Best& best, uint64_t error, uint32_t candidate) {
   if (error > best.squared_error || (error == best.squared_error && candidate >= best.index))
     return;
@@ -116,8 +117,8 @@ AF_KERNEL_INLINE void add_squared_difference(Lanes& sum, float coefficient, cons
   }
 }
 
-/// Offers the codewords of a block whose sums are within the limit, the nearest first: exact sums
-/// need no other, the rest are decided by integers.
+/// Offers the codewords of a block whose sums are within the limit, the nearest first. If sums are
+/// exact, no other is needed; otherwise integers decide.
 AF_KERNEL_INLINE void offer_lanes(
     const CodewordBlocks& blocks, uint32_t block, const uint16_t* tile, Lanes sums, Best& best) {
   while (bits_within(sums, best.limit) != 0) {
@@ -134,7 +135,7 @@ AF_KERNEL_INLINE void offer_lanes(
   }
 }
 
-/// Compares a tile with the 16 codewords of one block; gives up after five coefficients when all
+/// Compares a tile with the 16 codewords of one block. Gives up after five coefficients when all
 /// are too far.
 AF_KERNEL_INLINE void search_block(const CodewordBlocks& blocks,
                                    uint32_t block,
@@ -153,8 +154,8 @@ AF_KERNEL_INLINE float squared_gap(float gap) {
   return gap > 0.0f ? gap * gap : 0.0f;
 }
 
-/// Walks outwards from the tile's DC, a block above and a block below in turn (a branch on which
-/// is nearer would be a coin toss), until the DC alone is too far.
+/// Walks outwards from the tile's DC, alternating between a block above and a block below, until
+/// the DC alone is too far. A branch on which is nearer would be a coin toss.
 AF_KERNEL_INLINE Best search_outwards(const CodewordBlocks& blocks,
                                       const uint16_t* tile,
                                       Best best) {
@@ -194,8 +195,8 @@ AF_KERNEL_INLINE Lanes distances(const CodewordBox& box, const float* coefficien
   return sum;
 }
 
-/// Visits the blocks of a box, of which `nearest` is the nearest, while they may hold a codeword
-/// that is as near as the best. The nearest leaves few others, which come in any order.
+/// Visits the blocks of a box while they may hold a codeword as near as the best. `nearest` is the
+/// nearest block. It leaves few others, which come in any order.
 AF_KERNEL_INLINE void search_blocks_of_box(const CodewordBlocks& blocks,
                                            uint32_t box,
                                            const Lanes& to_blocks,
@@ -218,7 +219,7 @@ AF_KERNEL_INLINE void search_blocks_of_box(const CodewordBlocks& blocks,
 constexpr float kVisited = 3e38f;
 
 /// Visits the nearest child of a box first, down to the blocks, and the others while they may hold
-/// a codeword that is as near as the best.
+/// a codeword as near as the best.
 AF_KERNEL_INLINE Best search_boxes(const CodewordBlocks& blocks, const uint16_t* tile, Best best) {
   float coefficients[16];
   hadamard<kFoldedCoefficientOrder>(tile, coefficients);

@@ -16,8 +16,8 @@ namespace {
 
 constexpr std::uint64_t kInitialStream = 0x696E'6974'6961'6C00;  // "initial"
 
-/// Natural logarithm for (0, 1], accurate to about 1e-12: exponent and an atanh series, in
-/// correctly rounded operations only (libm's last bit differs between processors).
+/// Natural logarithm for (0, 1], accurate to about 1e-12: exponent and an atanh series. It uses
+/// only correctly rounded operations, because libm's last bit differs between processors.
 double portable_log(double value) {
   int exponent = 0;
   double mantissa = std::frexp(value, &exponent);  // exact
@@ -33,7 +33,7 @@ double portable_log(double value) {
   return 2.0 * z * series + 0.69314718055994531 * exponent;
 }
 
-/// The four summed histograms of a radix search: finds the key of the `count`-th smallest.
+/// Finds the key of the `count`-th smallest, by the four summed histograms of a radix search.
 std::uint64_t key_of_rank(std::span<const std::uint64_t> keys,
                           std::uint64_t count,
                           const CodebookReduction& reduction) {
@@ -86,14 +86,14 @@ std::uint64_t weighted_sampling_key(std::uint64_t seed, const NumberedTile& tile
     sum += level;
     sum_of_squares += level * level;
   }
-  // 16 times the squared AC norm; at least that of a norm of one level, so that flat tiles may be
-  // drawn.
+  // 16 times the squared AC norm. It is at least that of a norm of one level, so that flat tiles
+  // may be drawn.
   const std::uint64_t energy = std::max<std::uint64_t>(16 * sum_of_squares - sum * sum, 16);
   const double weight = std::sqrt(std::sqrt(static_cast<double>(energy)));
   const std::uint64_t bits =
       hash64(seed, kInitialStream, static_cast<std::uint64_t>(tile.global_index));
   const double uniform = (static_cast<double>(bits >> 11u) + 0.5) * 0x1.0p-53;
-  // Positive doubles order like their bits; log(uniform) < 0.
+  // Positive doubles have the order of their bits, and log(uniform) < 0.
   return std::bit_cast<std::uint64_t>(-portable_log(uniform) / weight);
 }
 

@@ -41,8 +41,8 @@ std::uint64_t held_out_above(std::uint64_t last_training) {
   return kEverything - std::min(last_training / 8, (kEverything - last_training) / 2);
 }
 
-/// Not above held_out_above(x) for any x up to `last_training`, with a margin for the rounding of
-/// its divisions.
+/// A bound that is not above held_out_above(x) for any x up to `last_training`, with a margin for
+/// the rounding of its divisions.
 std::uint64_t lowest_held_out(std::uint64_t last_training) {
   constexpr std::uint64_t kMostHeldOut = kEverything / 10 * 8;  // where the two halves meet
   return held_out_above(std::min(last_training, kMostHeldOut)) - 8;
@@ -56,7 +56,7 @@ struct Move {
   std::uint64_t taken = 0;
 };
 
-/// `counts[r]`: tiles of rank r. Every rank ends with the mean, the first ones with one more.
+/// `counts[r]`: tiles of rank r. Every rank ends with the mean, and the first ones with one more.
 Move move_of_rank(std::span<const std::uint64_t> counts, std::size_t rank) {
   const std::uint64_t all = std::accumulate(counts.begin(), counts.end(), std::uint64_t{0});
   Move move;
@@ -70,7 +70,7 @@ Move move_of_rank(std::span<const std::uint64_t> counts, std::size_t rank) {
 }
 
 /// Collective. Moves tiles from ranks that have more than the mean to ranks that have fewer, so
-/// that all take equally long to train; only the tiles moved travel.
+/// that all take equally long to train. Only the moved tiles travel.
 void level_out(std::vector<NumberedTile>& tiles, const CodebookReduction& reduction) {
   const std::uint64_t mine = tiles.size();
   std::vector<std::uint64_t> counts;
@@ -113,7 +113,7 @@ TrainingTilePicker::TrainingTilePicker(const TrainingSelection& selection,
     : selection_(selection), lattice_(lattice), histogram_(kBins, 0) {
   throw_if_any(problems(selection));
   set_threshold(last_hash_of_fraction(selection.fraction));
-  // Only the used part becomes memory. An eighth above the cap, so that dropping is rare.
+  // Only the used part takes memory. It goes an eighth above the cap, so that dropping is rare.
   constexpr std::uint64_t kMostReserved = std::uint64_t{1} << 24;
   const std::uint64_t most = std::min(selection.max_training_tiles, kMostReserved);
   candidates_.training.reserve(most + most / 8 + 1);
@@ -140,7 +140,7 @@ void TrainingTilePicker::add(const UnitTiles& tiles, const WorkUnit& unit) {
 }
 
 void TrainingTilePicker::keep_within_cap() {
-  // When one rank's tiles alone exceed the cap, those of all ranks do, too.
+  // When one rank's tiles alone exceed the cap, those of all ranks do too.
   set_threshold(capped_last_hash(histogram_, last_training_, selection_.max_training_tiles));
   drop_beyond();
 }
@@ -157,7 +157,7 @@ void TrainingTilePicker::drop_beyond() {
 }
 
 TrainingShare TrainingTilePicker::take(const CodebookReduction& reduction) {
-  // Above a rank's own threshold its histogram lacks tiles, but the common one lies below it.
+  // Above a rank's own threshold its histogram lacks tiles, but the common threshold lies below it.
   reduction.sum(histogram_);
   last_training_ = capped_last_hash(
       histogram_, last_hash_of_fraction(selection_.fraction), selection_.max_training_tiles);

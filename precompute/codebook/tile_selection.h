@@ -18,17 +18,17 @@ struct NumberedTile {
   Tile tile{};
 };
 
-/// Tiles on which a rank trains, and tiles with which it only measures the codebook.
+/// Tiles on which a rank trains, and tiles on which it only measures the codebook.
 struct TrainingShare {
   std::vector<NumberedTile> training;
   std::vector<NumberedTile> held_out;
 };
 
-/// Largest share of tiles used for training; an eighth of that number is held out in addition.
+/// Largest share of tiles used for training. An eighth of that number is held out in addition.
 inline constexpr double kLargestTrainingFraction = 8.0 / 9.0;
 
 struct TrainingSelection {
-  double fraction = kLargestTrainingFraction;  ///< of the tiles that are not empty
+  double fraction = kLargestTrainingFraction;  ///< share of the tiles that are not empty
   std::uint64_t max_training_tiles = 2000000;  ///< over all ranks
   std::uint64_t seed = 1;
 };
@@ -39,8 +39,8 @@ std::vector<std::string> problems(const TrainingSelection& selection);
 /// trains when hash(seed, i) lies below a threshold, so the choice depends on neither ranks nor
 /// plan. The threshold follows from the fraction, or is the highest of 65536 steps that keeps the
 /// training tiles of all ranks within the cap. An eighth of their number is held out in addition.
-/// Empty tiles are ignored: they are codeword 0. The picker never holds many more candidates than
-/// five quarters of the cap.
+/// Empty tiles are ignored, because they are codeword 0. The picker never holds many more
+/// candidates than five quarters of the cap.
 /// \test TileSelection.*
 class TrainingTilePicker {
  public:
@@ -48,7 +48,7 @@ class TrainingTilePicker {
 
   void add(const UnitTiles& tiles, const WorkUnit& unit);
 
-  /// Collective. Returns this rank's equal share of the tiles picked on all ranks and empties the
+  /// Collective. Returns this rank's equal share of the tiles picked on all ranks, and empties the
   /// picker.
   [[nodiscard]] TrainingShare take(const CodebookReduction& reduction);
 
@@ -63,7 +63,7 @@ class TrainingTilePicker {
   std::uint64_t last_training_ =
       0;  ///< largest hash that trains, by the fraction or this rank's cap
   std::uint64_t held_out_above_ = 0;      ///< no hash up to it is held out
-  std::vector<std::uint64_t> histogram_;  ///< of the hashes at most last_training_, by bin
+  std::vector<std::uint64_t> histogram_;  ///< of the hashes up to last_training_, by bin
   TrainingShare candidates_;
 };
 

@@ -9,9 +9,9 @@
 
 namespace af {
 
-/// Codeword indices, and means, of one unit's tiles, stored as Codebook says, and the exact sum of
-/// their squared errors in levels; empty tiles get codeword 0. With means, decoding clamps levels
-/// to 0 ... 65535, but the errors count before clamping.
+/// Codeword indices and means of one unit's tiles, stored as Codebook says, and the exact sum of
+/// their squared errors in levels. Empty tiles get codeword 0. With means, decoding clamps levels
+/// to 0 ... 65535, but errors are counted before clamping.
 struct EncodedUnit {
   std::vector<std::uint16_t> indices;
   std::uint64_t squared_error = 0;

@@ -26,7 +26,7 @@ struct DesignBudget {
 /// "at least 50 dB, at most 8.00 MB"
 std::string to_text(const DesignBudget& budget);
 
-/// The parts of a design that are stated; a search keeps them.
+/// The stated parts of a design, which a search keeps.
 struct DesignParts {
   std::optional<int> slabs;
   std::optional<int> uv_nodes;

@@ -12,7 +12,7 @@ namespace af {
 
 namespace {
 
-// Exponents found on three CTs.
+// These exponents were found on three CTs.
 constexpr double kUvExponent = 3.0;
 constexpr double kStExponent = 2.1;
 constexpr double kQuantisationUvExponent = 1.0;
@@ -65,7 +65,7 @@ double DesignModel::quantisation_law(const FieldDesign& design) const {
 }
 
 void DesignModel::fit() {
-  // The values under which the law explains the points best; the middle where it does not matter.
+  // The values under which the law explains the points best. The middle where it does not matter.
   const auto fitted = [&](double& value, double low, double high, const auto& law, const auto& db) {
     const double middle = value;
     double best = std::numeric_limits<double>::infinity();

@@ -16,9 +16,9 @@ struct DesignPoint {
   double footprint_nodes = 0.0;
 };
 
-/// Extrapolates forecasts from measured designs by power laws: losses fall over (u,v) with the
-/// number of viewpoints times slabs, over (s,t) with the nodes. The weight of each law is fitted to
-/// the points. At a measured point it returns that point's forecast.
+/// Extrapolates forecasts from measured designs by power laws. Losses fall over (u,v) with the
+/// number of viewpoints times slabs, and over (s,t) with the nodes. The weight of each law is
+/// fitted to the points. At a measured point it returns that point's forecast.
 class DesignModel {
  public:
   void add(const std::vector<DesignPoint>& points) {
@@ -26,10 +26,10 @@ class DesignModel {
   }
   [[nodiscard]] const std::vector<DesignPoint>& points() const { return points_; }
 
-  /// Fits the shares; call after add().
+  /// Fits the shares. Call it after add().
   void fit();
 
-  /// Extrapolates from the nearest point with that look-up, of which there must be one.
+  /// Extrapolates from the nearest point with that look-up. There must be one.
   [[nodiscard]] DesignForecast forecast(const FieldDesign& design) const;
 
  private:
@@ -38,8 +38,8 @@ class DesignModel {
   [[nodiscard]] double quantisation_law(const FieldDesign& design) const;
 
   std::vector<DesignPoint> points_;
-  double st_share_ = 0.5;     ///< of the interpolation loss of a middling design
-  double st_exponent_ = 1.0;  ///< of the quantisation loss
+  double st_share_ = 0.5;     ///< share in the interpolation loss of a middling design
+  double st_exponent_ = 1.0;  ///< for the quantisation loss
 };
 
 }  // namespace af

@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::int64_t kMegabyte = 1000000;
 
-/// Every preset there is; a new one joins here.
+/// Every preset. A new one is added here.
 const std::array presets = {
     DesignPreset{
         kPaperPreset, "one slab of 64 x 64 x 256 x 256 nodes", {1, 64, 256, 16384, "linear"}, {}},
@@ -18,14 +18,14 @@ const std::array presets = {
                  "the best within 4 MB by a probe of the CT",
                  {12, 8, 256, 16384, "cubic"},
                  {std::nullopt, 4 * kMegabyte, std::nullopt}},
-    // For registration, depth slabs matter more than PSNR: with the one slab that a probe chose at
+    // For registration, depth slabs matter more than PSNR. With the one slab that a probe chose at
     // the same PSNR, registrations ended twice as far from ray casting's pose.
     DesignPreset{"standard",
                  "for registration, six slabs of 14 x 14 x 384 x 384 nodes",
                  {6, 14, 384, 4096, "cubic", 96, true, true},
                  {}},
-    // One codebook serves every angle: with 4096 codewords the worst DRRs lost 1.7 dB
-    // against those of an angle's own field (docs/other-cameras.md#what-an-atlas-costs).
+    // One codebook serves every angle. With 4096 codewords the worst DRRs lost 1.7 dB compared with
+    // those of an angle's own field (docs/other-cameras.md#what-an-atlas-costs).
     DesignPreset{kAtlasPreset,
                  "eight slabs of 12 x 12 x 384 x 384 nodes",
                  {8, 12, 384, 16384, "cubic", 64},

@@ -12,18 +12,18 @@ namespace af {
 struct DesignPreset {
   const char* name = nullptr;
   const char* help = nullptr;
-  FieldDesign design;   ///< fixed, or where a probe may not be made
-  DesignBudget budget;  ///< none stated: the design is fixed
+  FieldDesign design;   ///< fixed, or where a probe must not be made
+  DesignBudget budget;  ///< empty: the design is fixed
 };
 
-/// What a field gets when nothing is said about its design.
+/// The preset of a field when nothing is said about its design.
 inline constexpr const char* kDefaultPreset = "standard";
-/// What the fields of an atlas get.
+/// The preset of an atlas's fields.
 inline constexpr const char* kAtlasPreset = "atlas";
 /// The paper's own design, for comparisons.
 inline constexpr const char* kPaperPreset = "paper";
 
-/// InputError for an unknown name.
+/// The preset of that name. Throws InputError for an unknown name.
 const DesignPreset& design_preset_named(const std::string& name);
 
 /// Names that design_preset_named() knows, and one line that explains them.

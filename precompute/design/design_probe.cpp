@@ -31,7 +31,7 @@ std::vector<std::vector<T>> gathered(const CodebookReduction& reduction, std::sp
   return all;
 }
 
-/// Values of tasks that each rank did its share of.
+/// Values of tasks of which each rank did its share.
 template <typename T>
 void share_out(const CodebookReduction& reduction, std::span<T> of_task) {
   const auto all = gathered<T>(reduction, of_task);
@@ -145,7 +145,7 @@ std::vector<NumberedTile> DesignProbe::shuffled_tiles(const FieldSample& sample,
   const double share = static_cast<double>(wanted) / static_cast<double>(count[0] + 1);
   const std::uint64_t last =
       share >= 1.0 ? ~std::uint64_t{0} : static_cast<std::uint64_t>(share * 0x1p64);
-  // A random order that depends on the tiles alone.
+  // The order is random, but depends on the tiles alone.
   std::vector<KeyedTile> mine;
   for (const FieldSample::Chunk& chunk : sample.chunks) {
     const TilePlaces places(lattice, chunk.unit);
@@ -241,7 +241,7 @@ DesignMeasurement DesignProbe::measure(const FieldDesign& design,
       sums[1] += static_cast<std::uint64_t>(bytes.tiles);
     }
     reduction_.sum(sums);
-    // Extrapolates from a smaller codebook to the one wanted.
+    // This extrapolates from a smaller codebook to the wanted one.
     const double missing_bits = std::log2(1.0 * count / static_cast<double>(codebook.size()));
     measured.bytes_per_tile[count] =
         kTrainedCodebook *

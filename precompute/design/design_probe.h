@@ -16,26 +16,26 @@
 
 namespace af {
 
-/// Mean squared differences from ray casting at one pose over the foreground, as parts of the
-/// squared maximum of the DRR; [0] linear, [1] cubic look-up.
+/// Mean squared differences from ray casting at one pose over the foreground, divided by the
+/// squared maximum of the DRR. [0] is linear, [1] cubic look-up.
 struct PoseLoss {
   std::array<double, 2> interpolation{};
   std::array<double, 2> quantisation{};  ///< with the largest small codebook
-  /// Loss of both together beyond the sum of the two, because both blur.
+  /// Loss of both together beyond the sum of the two, which arises because both blur.
   std::array<double, 2> common{};
 };
 
-/// What a probe measured of one design, for any look-up and size of the codebook.
+/// What a probe measured for one design, for any look-up and size of the codebook.
 struct DesignMeasurement {
   FieldDesign design;
   std::vector<PoseLoss> poses;
   double occupied_tiles = 0.0;
-  std::array<double, kProbeCodewords.size()> tile_errors{};  ///< of unseen tiles, small codebooks
+  std::array<double, kProbeCodewords.size()> tile_errors{};  ///< for unseen tiles, small codebooks
   double drr_pixels = 0.0;
   double footprint_nodes = 0.0;          ///< per slab
   std::map<int, double> bytes_per_tile;  ///< by codewords
   std::map<int, double> training_tiles;  ///< likewise
-  /// Largest number of codewords that the tiles suffice for.
+  /// Largest number of codewords for which the tiles suffice.
   int most_codewords = 0;
 
   /// Forecast for a number of codewords that was measured.
@@ -44,8 +44,8 @@ struct DesignMeasurement {
 };
 
 struct ProbeOptions {
-  int viewpoints = 3;  ///< of each slab, whose whole planes are cast
-  /// The tiles on which a field's codebook of so many codewords is trained.
+  int viewpoints = 3;  ///< per slab, whose whole planes are cast
+  /// The tiles on which a field's codebook of this size is trained.
   std::function<TrainingSelection(int codewords)> selection_for = [](int /*codewords*/) {
     return TrainingSelection{};
   };
@@ -53,17 +53,17 @@ struct ProbeOptions {
 };
 
 /// Measures designs of a field without making them. Collective over the ranks of `reduction`, which
-/// share the work; the results are the same on any number of ranks.
+/// share the work. The results are the same on any number of ranks.
 class DesignProbe {
  public:
-  /// `rays`: draw_probe_rays() of this rank's share.
+  /// `rays`: this rank's share, from draw_probe_rays().
   DesignProbe(const ProbeScene& scene,
               const ProbeOptions& options,
               ProbeRays rays,
               const CodebookReduction& reduction,
               std::size_t ranks);
 
-  /// Interpolation, quantisation and size. `codewords`: sizes of codebooks that matter.
+  /// Measures interpolation, quantisation and size. `codewords`: sizes of codebooks that matter.
   [[nodiscard]] DesignMeasurement measure(const FieldDesign& design,
                                           std::span<const int> codewords) const;
 

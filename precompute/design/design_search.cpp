@@ -14,13 +14,13 @@ namespace af {
 
 namespace {
 
-/// Share of the requested size to aim for; the rest allows for forecast errors.
+/// Share of the requested size to aim for. The rest allows for forecast errors.
 constexpr double kSizeMargin = 0.97;
 constexpr int kMostMeasured = 5;
 /// After this many measurements, a measured design may be worse by more than kLittle.
 constexpr int kEnoughMeasured = 3;
 
-/// A number with so many digits after the point.
+/// A number with this many digits after the point.
 std::string fixed(double value, int digits) {
   std::array<char, 64> text{};
   const auto end = std::to_chars(
@@ -33,7 +33,7 @@ std::string summary(const DesignForecast& forecast) {
          fixed(forecast.drr_ms, 3) + " ms (" + to_text(forecast.design) + ")";
 }
 
-/// All designs of the family that agree with the parts stated.
+/// All designs of the family that agree with the stated parts.
 class Family {
  public:
   Family(const SearchSpace& space, bool may_be_linear) {
@@ -63,7 +63,7 @@ class Family {
     for (const std::string& look_up : look_ups_)
       for (const int slabs : slabs_)
         for (const int uv : uv_nodes_) {
-          // Fewer viewpoints always blur; more add cost without benefit.
+          // Fewer viewpoints always blur, and more add cost without benefit.
           constexpr int kFewest = 40;
           constexpr int kMost = 128;
           if (is_uv_free_ && (slabs * uv < kFewest || slabs * uv > kMost)) continue;
@@ -99,12 +99,12 @@ class Judge {
     return fits_size(forecast) && fits_time(forecast) &&
            (!budget_.target_psnr_db || forecast.psnr_db >= *budget_.target_psnr_db);
   }
-  /// Not much better than was asked for.
+  /// Whether the forecast is not much better than was asked for.
   [[nodiscard]] bool is_near_target(const DesignForecast& forecast) const {
     constexpr double kNearDb = 0.3;
     return !budget_.target_psnr_db || forecast.psnr_db <= *budget_.target_psnr_db + kNearDb;
   }
-  /// Smaller is better.
+  /// The cost of a forecast. Smaller is better.
   [[nodiscard]] double cost(const DesignForecast& forecast) const {
     // A DRR of twice the time must save a sixth of the file, or give 0.3 dB more.
     const double doublings = std::log2(std::max(forecast.drr_ms, 1e-6));
@@ -119,7 +119,8 @@ class Judge {
   const SearchSpace& space_;
 };
 
-/// Whether the probe need not measure `design`: it has measured one with almost the same nodes.
+/// Whether the probe need not measure `design`, because it has measured one with almost the same
+/// nodes.
 bool is_measured(const FieldDesign& design, const DesignModel& model) {
   return std::ranges::any_of(model.points(), [&](const DesignPoint& point) {
     const FieldDesign& known = point.forecast.design;
@@ -133,10 +134,10 @@ bool is_measured(const FieldDesign& design, const DesignModel& model) {
 
 struct Choice {
   std::optional<DesignForecast> best;
-  std::optional<DesignForecast> best_measured;  ///< of designs that count as measured
-  std::optional<DesignForecast> other_slabs;    ///< the best of another number of slabs
-  DesignForecast highest_psnr;                  ///< of those that fit size and time
-  DesignForecast smallest;                      ///< of those with the PSNR
+  std::optional<DesignForecast> best_measured;  ///< among designs that count as measured
+  std::optional<DesignForecast> other_slabs;    ///< the best with another number of slabs
+  DesignForecast highest_psnr;                  ///< among those that fit size and time
+  DesignForecast smallest;                      ///< among those with the PSNR
   std::optional<DesignForecast> fastest;
   bool has_highest = false;
   bool has_smallest = false;
@@ -195,7 +196,7 @@ Choice choice_of(const Family& family,
   throw InputError(text);
 }
 
-/// Where a search begins: between the designs that usually win.
+/// Where a search begins: among the designs that usually win.
 FieldDesign first_guess(const SearchSpace& space) {
   FieldDesign guess{8, 10, 288, 16384, "cubic"};
   if (space.most_slabs < 32) guess = {1, 64, 256, 16384, "cubic"};
@@ -221,7 +222,7 @@ ChosenDesign search_design(const DesignBudget& budget,
     model.fit();
     chosen.measured.push_back(model.forecast(next));
     choice = choice_of(family, judge, model, budget);
-    // Prefer a measured design to one that the model only forecasts to be slightly better.
+    // A measured design is preferred to one that the model only forecasts to be slightly better.
     constexpr double kLittle = 0.06;
     const double allowed = measured + 1 < kEnoughMeasured ? kLittle : 3.0 * kLittle;
     if (choice.best_measured &&
@@ -230,7 +231,7 @@ ChosenDesign search_design(const DesignBudget& budget,
       choice.best = choice.best_measured;
       break;
     }
-    // The model may be wrong that nothing fits: measure at the edge of the budget.
+    // The model may wrongly say that nothing fits, so measure at the edge of the budget.
     if (choice.best)
       next = choice.best->design;
     else if (choice.has_highest)

@@ -15,7 +15,8 @@ struct SearchSpace {
   int most_slabs = 12;  ///< slices of the CT that attenuate
 };
 
-/// Measures designs of these slabs and nodes: points for look-ups and codebooks that may be chosen.
+/// Measures designs with these slabs and nodes. Gives points for look-ups and codebooks that may be
+/// chosen.
 using MeasureDesign = std::function<std::vector<DesignPoint>(const FieldDesign& design)>;
 
 struct ChosenDesign {
@@ -25,11 +26,12 @@ struct ChosenDesign {
   DesignForecast runner_up;  ///< the best with another number of slabs, by the model; slabs 0: none
 };
 
-/// Finds the best design within a budget: with a PSNR to reach, the smallest file, or the fastest
-/// DRR among files within a few percent of it; otherwise the highest PSNR, or the fastest DRR among
-/// designs within a fifth of a decibel. It measures a first guess, forecasts all other designs by
-/// the model, measures the best of them, and repeats until the best is (almost) measured.
-/// InputError, naming the best possible design, when none fits. \test DesignSearch.*
+/// Finds the best design within a budget. With a PSNR to reach, that is the smallest file, or the
+/// fastest DRR among files within a few percent of it. Otherwise it is the highest PSNR, or the
+/// fastest DRR among designs within a fifth of a decibel. The search measures a first guess,
+/// forecasts all other designs by the model, measures the best of them, and repeats until the best
+/// is (almost) measured. Throws InputError, naming the best possible design, when none fits. \test
+/// DesignSearch.*
 ChosenDesign search_design(const DesignBudget& budget,
                            const SearchSpace& space,
                            const MeasureDesign& measure);

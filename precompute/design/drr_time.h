@@ -5,8 +5,8 @@
 
 namespace af {
 
-/// An estimate: milliseconds of one DRR by look-up in two passes on one core of some 3 GHz, for so
-/// many pixels and so many (s,t) nodes of a slab under them.
+/// Estimates the milliseconds for one DRR by look-up in two passes on one core of some 3 GHz, for
+/// this many pixels, and this many (s,t) nodes of a slab under them.
 double estimated_drr_ms(const FieldDesign& design, double pixels, double nodes);
 
 }  // namespace af

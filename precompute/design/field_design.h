@@ -12,7 +12,7 @@ struct FieldDesign {
   int st_nodes = 256;
   int codewords = 16384;
   std::string look_up = "linear";  ///< "linear" or "cubic": how DRRs are meant to be looked up
-  int mean_step = 0;               ///< levels, of mean-removed tiles; 0: plain ones
+  int mean_step = 0;               ///< for mean-removed tiles, levels; 0: plain ones
   bool fits_uv = false;  ///< samples fit linear interpolation over (u,v): LeastSquaresFieldCaster
   bool filters_tiles = false;  ///< decoded tiles are corrected by their neighbours: TileFilter
 
@@ -22,14 +22,14 @@ struct FieldDesign {
 /// "4 slabs, 16 x 16 (u,v) nodes, 384 x 384 (s,t) nodes, 16384 codewords, cubic look-up"
 std::string to_text(const FieldDesign& design);
 
-/// What a design is expected to give.
+/// What a design is expected to achieve.
 struct DesignForecast {
   FieldDesign design;
   double psnr_db = 0.0;           ///< median over poses of the motion box, eq. (12)
   double interpolation_db = 0.0;  ///< the same without quantisation
   double quantisation_db = 0.0;   ///< the same without interpolation
   double file_bytes = 0.0;
-  double drr_ms = 0.0;  ///< one DRR of the whole detector on one core
+  double drr_ms = 0.0;  ///< for one DRR of the whole detector on one core
 };
 
 }  // namespace af

@@ -16,13 +16,14 @@ struct FieldSample {
     WorkUnit unit;
     UnitTiles tiles;
   };
-  std::vector<Chunk> chunks;           ///< of this rank
-  std::vector<double> occupied_share;  ///< of every chunk over all ranks; only this rank's are set
-  std::vector<double> tiles_meant;     ///< tiles of the field that each chunk stands for, of all
+  std::vector<Chunk> chunks;           ///< this rank's
+  std::vector<double> occupied_share;  ///< one per chunk over all ranks; only this rank's are set
+  std::vector<double>
+      tiles_meant;  ///< tiles of the field that each chunk represents, over all ranks
 };
 
 /// Casts whole (s,t) planes from `viewpoints` 2 x 2 blocks of viewpoints, evenly spread over the
-/// (u,v) plane, chunk by chunk; a rank casts its share of chunks.
+/// (u,v) plane, chunk by chunk. A rank casts its share of chunks.
 FieldSample sample_field(const FieldCaster& caster,
                          const FieldLattice& lattice,
                          int viewpoints,

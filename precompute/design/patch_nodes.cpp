@@ -57,7 +57,7 @@ struct NodeValues {
   }
 };
 
-/// A node halfway between any two, by Lagrange's polynomial through six; the edge is replicated.
+/// A node halfway between any two, by Lagrange's polynomial through six. The edge is replicated.
 template <typename At>
 double halfway(const At& at, int below, int count) {
   constexpr std::array<double, kCubicReach> kWeights = {150.0 / 256, -25.0 / 256, 3.0 / 256};
@@ -129,8 +129,8 @@ void PatchNodes::add_slab(std::size_t k,
   const WorkUnit& unit = units_[k];
   const SlabGeometry& slab = planes_.slabs[k];
   if (std::ranges::none_of(samples, [](std::uint16_t level) { return level != 0; })) return;
-  // First pass: viewpoints blended at every node, by where the ray from the source to it meets the
-  // (u,v) plane.
+  // In the first pass, viewpoints are blended at every node, by where the ray from the source to it
+  // meets the (u,v) plane.
   NodeValues blended(unit.s.count, unit.t.count);
   const Eigen::Vector3d& source = patch_.source_point;
   const double reach = (planes_.uv_plane_y_mm - source.y()) / (slab.st_plane_y_mm - source.y());

@@ -19,7 +19,7 @@ struct PatchValues {
 };
 
 /// The cast nodes (whole tiles) of one field around one patch of rays, in every slab. Looks the
-/// patch up as TwoPassAfDrr does, before and after quantisation, but slab by slab; TwoPassAfDrr
+/// patch up as TwoPassAfDrr does, before and after quantisation, but slab by slab. TwoPassAfDrr
 /// first sums slabs on one plane, which is about as good.
 /// \test DesignProbeTest.LooksPatchesOfOneSlabUpAsTwoPassAfDrrDoes
 class PatchNodes {
@@ -30,9 +30,9 @@ class PatchNodes {
              float quantizer_step,
              const RayPatch& patch);
 
-  /// From the nodes as they were cast, 16 bits each.
+  /// Values from the nodes as they were cast, 16 bits each.
   [[nodiscard]] PatchValues values() const { return values_of(samples_); }
-  /// From the nearest codewords of their tiles.
+  /// Values from the nearest codewords of their tiles.
   [[nodiscard]] PatchValues values(const NearestCodeword& search, const Codebook& codebook) const;
 
  private:

@@ -18,9 +18,9 @@ constexpr std::uint64_t kPoseStream = 0x70726F6265;  // "probe"
 constexpr int kMostDraws = 1000;
 /// Poses with less foreground say nothing about a field.
 constexpr double kLeastForeground = 0.01;
-/// A patch is about so wide where the CT is: some ten (s,t) nodes.
+/// Width of a patch at the CT: about ten (s,t) nodes.
 constexpr double kPatchMm = 12.0;
-/// Share of the patches drawn evenly over the foreground, whatever the roughness.
+/// Share of the patches drawn evenly over the foreground, independent of the roughness.
 constexpr double kEvenShare = 0.3;
 
 /// The detector cut into squares, each a possible patch.
@@ -147,7 +147,7 @@ class PoseSampler {
                     ProbeRays& rays) const {
     const std::vector<double> probability =
         patch_probabilities(coarse, 2 * grid_.columns, 2 * grid_.rows);
-    // Systematic sampling: evenly spaced marks on the line of summed probabilities.
+    // Systematic sampling puts evenly spaced marks on the line of summed probabilities.
     const double first_mark = random.uniform();
     double sum = 0.0;
     int next = 0;

@@ -36,15 +36,15 @@ struct ProbeRayCount {
   int patches_per_pose = 6;
 };
 
-/// Rays over which DRRs are judged, with what ray casting gives for them: poses uniform in the
-/// motion box, as af-evaluate image-quality draws them; at each, patches drawn with a probability
-/// that grows with the roughness of the DRR, and weighted by its inverse, because errors are large
-/// where a DRR has edges. A rank makes those of poses `rank`, rank + ranks, ... only; the values
-/// depend on the seed alone.
+/// Rays over which DRRs are judged, with what ray casting gives for them. Poses are uniform in the
+/// motion box, as af-evaluate image-quality draws them. At each pose, patches are drawn with a
+/// probability that grows with the roughness of the DRR, and are weighted by its inverse, because
+/// errors are large where a DRR has edges. A rank makes only those of poses `rank`, rank + ranks,
+/// ... The values depend on the seed alone.
 struct ProbeRays {
-  std::vector<RayPatch> patches;   ///< of this rank, poses in order
+  std::vector<RayPatch> patches;   ///< this rank's, poses in order
   std::size_t poses = 0;           ///< over all ranks
-  std::vector<ProbePose> of_pose;  ///< of all; only this rank's are set
+  std::vector<ProbePose> of_pose;  ///< over all ranks; only this rank's are set
 };
 
 /// Which share of independent tasks a rank does.

@@ -15,26 +15,27 @@
 
 namespace af {
 
-/// What a probe looks at: one CT in front of one moving camera. All of it must outlive the probe.
+/// What a probe looks at: one CT in front of one moving camera. It must outlive the probe.
 struct ProbeScene {
   const AttenuationVolume& volume;
   const SlabAlignedVolume& resampled;    ///< in the field's frame
-  std::vector<std::int64_t> slice_sums;  ///< of it
+  std::vector<std::int64_t> slice_sums;  ///< of the resampled CT
   CameraGeometry camera;
   PoseFrame frame;
   MotionRange range;
   AttenuationQuantizer quantizer;
   std::optional<StPlane> st_plane;  ///< none: the default for the number of slabs
   std::string caster = "shear-warp";
-  RayCasterOptions ray_caster;     ///< of the trilinear caster
-  std::vector<HalfSpace> sources;  ///< of the range's poses, those to hold: LightSlabSpec::sources
+  RayCasterOptions ray_caster;  ///< for the trilinear caster
+  std::vector<HalfSpace>
+      sources;  ///< those of the range's poses that must be held: LightSlabSpec::sources
 
-  /// The planes of a design, as af-precompute makes them. Errors of choose_depth_slabs() and
-  /// make_light_slab().
+  /// The planes of a design, as af-precompute makes them. Throws as choose_depth_slabs() and
+  /// make_light_slab() do.
   [[nodiscard]] LightSlab planes(const FieldDesign& design) const;
-  /// A caster of such planes, which must outlive it.
+  /// A caster for such planes, which must outlive it.
   [[nodiscard]] std::unique_ptr<const FieldCaster> make_caster(const LightSlab& planes) const;
-  /// Slices that attenuate: most slabs that can be made.
+  /// How many slices attenuate: the most slabs that can be made.
   [[nodiscard]] int most_slabs() const;
 };
 

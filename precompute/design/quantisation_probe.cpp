@@ -17,7 +17,7 @@ namespace {
 
 constexpr int kIterations = 5;
 /// Excess of unseen tiles' squared error over that after unlimited training, times tiles per
-/// codeword: 1.16 at 14 and 1.05 at 64, of a skull in the paper's design. Tiles trained on fall
+/// codeword: 1.16 at 14 and 1.05 at 64, for a skull in the paper's design. Training tiles fall
 /// short by about as much.
 constexpr double kUnseenExcess = 2.5;
 
@@ -73,7 +73,7 @@ Codebook drawn_codebook(std::span<const NumberedTile> shuffled, const ProbedCode
 double error_ratio(const std::array<double, kProbeCodewords.size()>& errors_of_small,
                    int codewords,
                    const TrainingTiles& tiles) {
-  // About -0.45 in practice; a field of few tiles has too few errors to estimate it.
+  // It is about -0.45 in practice. A field of few tiles has too few errors to estimate it.
   const double falls = std::clamp(std::log(errors_of_small[1] / errors_of_small[0]) /
                                       std::log(1.0 * kProbeCodewords[1] / kProbeCodewords[0]),
                                   -0.8,

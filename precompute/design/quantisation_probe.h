@@ -14,15 +14,15 @@
 
 namespace af {
 
-/// Sizes of the small codebooks that a probe trains; real ones would take too long.
+/// Sizes of the small codebooks that a probe trains, because real ones would take too long.
 inline constexpr std::array<int, 2> kProbeCodewords = {512, 2048};
-/// Training tiles per codeword of each.
+/// Training tiles per codeword of each small codebook.
 inline constexpr std::size_t kProbeTilesPerCodeword = 32;
-/// Tiles that train none of them, if there are that many.
+/// How many tiles train none of them, if there are that many.
 inline constexpr std::size_t kProbeUnseenTiles = 8192;
 
-/// Tiles that a probe needs for a field of so many codewords: for the largest small codebook, and
-/// to draw from.
+/// Tiles that a probe needs for a field with this many codewords: for the largest small codebook,
+/// and to draw from.
 constexpr std::size_t probe_tiles(int codewords) {
   return std::max(
       kProbeTilesPerCodeword * static_cast<std::size_t>(kProbeCodewords.back()) + kProbeUnseenTiles,
@@ -32,17 +32,17 @@ constexpr std::size_t probe_tiles(int codewords) {
 /// Specification of a probe's codebook.
 struct ProbedCodebook {
   int codewords;
-  int mean_step;  ///< of mean-removed tiles; 0: plain ones
+  int mean_step;  ///< for mean-removed tiles; 0: plain ones
   std::uint64_t seed;
 };
 
-/// Trains a codebook, as for a field, on the first tiles of `shuffled`, kProbeTilesPerCodeword per
+/// Trains a codebook as for a field, on the first tiles of `shuffled`, kProbeTilesPerCodeword per
 /// codeword: on plain tiles, or on folded shapes (remove_means()) where `wanted.mean_step` is above
-/// 0. Has fewer codewords when there are too few tiles.
+/// 0. It has fewer codewords when there are too few tiles.
 Codebook small_codebook(std::span<const NumberedTile> shuffled, const ProbedCodebook& wanted);
 
-/// A full-size codebook whose codewords are drawn, not trained: its indices compress like a
-/// field's. Has fewer codewords when there are less than twice as many tiles.
+/// A full-size codebook whose codewords are drawn, not trained, because its indices compress like a
+/// field's. It has fewer codewords when there are less than twice as many tiles.
 Codebook drawn_codebook(std::span<const NumberedTile> shuffled, const ProbedCodebook& wanted);
 
 /// Sum over tiles, or folded shapes, of the squared distance to the nearest codeword, in levels.
@@ -51,7 +51,7 @@ double squared_error(std::span<const NumberedTile> tiles, const Codebook& codebo
 /// What a field's codebook will be trained on.
 struct TrainingTiles {
   double training = 0.0;
-  double occupied = 0.0;  ///< of the whole field: not empty
+  double occupied = 0.0;  ///< tiles of the whole field that are not empty
 };
 
 /// A field's squared error with `codewords` relative to that with the largest small codebook,

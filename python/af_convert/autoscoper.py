@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Autoscoper's tracking files (.tra): one line per frame of the X-ray films with the 16 numbers of room_from_volume, row by
-row, mm, or 16 times NaN where a frame was not tracked."""
+"""Autoscoper's tracking files (.tra). Each frame of the X-ray films has one line with the 16 numbers of room_from_volume,
+row by row, in mm. A frame that was not tracked has 16 times NaN."""
 import re
 
 import numpy as np
@@ -15,15 +15,15 @@ _LETTERS = re.compile(r"[0-9+\-.eEnaNA, \t]*")
 
 
 def ct_from_volume(grid):
-    """Of voxel (i, j, k) the centre lies at x = (i + 0.5) sx, y = (ny - j - 0.5) sy, z = -(k + 0.5) sz: the origin is the lower
-    left corner of the stack's first picture, y points up, and the stack grows along -z."""
+    """The centre of voxel (i, j, k) lies at x = (i + 0.5) sx, y = (ny - j - 0.5) sy, z = -(k + 0.5) sz. The origin is the
+    lower left corner of the stack's first picture, y points up, and the stack grows along -z."""
     require(np.linalg.det(grid.direction) > 0, "direction of the CT's axes = left-handed: must be right-handed for Autoscoper's "
             "volume frame")
     return transform(grid.direction * [1, -1, -1], grid.point_mm([-0.5, grid.size[1] - 0.5, -0.5]))
 
 
 def is_autoscoper(source):
-    # One line of 16 numbers may also be a plain 4x4 matrix: then the name decides.
+    # One line of 16 numbers may also be a plain 4x4 matrix, so the file's name decides.
     return bool(source.lines) and (len(source.lines) > 1 or source.path.suffix == ".tra") and all(
         len(line.words) == 16 and _LETTERS.fullmatch(line.text) for line in source.lines)
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What formats of poses ask of the CT, the cameras and the study that a pose is of. The CT's grid is that of af-inspect, started
-as a process of its own: its HDF5 is another than h5py's."""
+"""What formats of poses need to know about the pose's CT, cameras and study. The CT's grid comes from af-inspect, which
+runs as a separate process because its HDF5 library is not the one that h5py has loaded."""
 import json
 import pathlib
 import resource
@@ -36,7 +36,7 @@ class Grid:
 
 
 def af_inspect():
-    """The af-inspect beside af-convert, else of the PATH."""
+    """The af-inspect beside af-convert, or else the one on the PATH."""
     beside = pathlib.Path(sys.argv[0]).absolute().parent / "af-inspect"
     found = str(beside) if beside.is_file() else shutil.which("af-inspect")
     if found is None:
@@ -45,8 +45,8 @@ def af_inspect():
 
 
 def inspected(path, options=()):
-    """The facts of af-inspect PATH --json. Its error is ours, with its exit code."""
-    most = resource.getrlimit(resource.RLIMIT_DATA)[1]  # ours is for small files
+    """The facts that af-inspect PATH --json prints. Its errors become ours, with its exit code."""
+    most = resource.getrlimit(resource.RLIMIT_DATA)[1]  # our soft limit is for small files
     run = subprocess.run([af_inspect(), str(path), *options, "--json"], capture_output=True, text=True, check=False,
                          preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_DATA, (most, most)))
     report = json.loads(run.stdout)[0] if run.stdout.startswith("[") else {"error": run.stderr.strip()[-2000:]}
@@ -58,7 +58,7 @@ def inspected(path, options=()):
 
 
 class Study:
-    """A study.toml, of which only what matters here is read."""
+    """The parts of a study.toml that matter here."""
 
     def __init__(self, path, case=None):
         self.path = pathlib.Path(path)
@@ -82,7 +82,7 @@ class Study:
         return self.path.parent / name
 
     def rig_files(self):
-        """The files of its rig; a shipped rig is a name."""
+        """The files of its rig. A shipped rig is given by its name."""
         rig = Table(self.table, self.place).text("rig")
         return [str(self.file(part)) if self.file(part).exists() else part for part in ([rig] if self.file(rig).exists() else rig.split(","))]
 
@@ -92,7 +92,7 @@ class Study:
         return self.file(case.text("ct")), ["--series", series] if series else []
 
     def nominal_pose(self):
-        """As the study states it, or, where it does not, as af-inspect works it out."""
+        """The pose that the study states. If it states none, the one that af-inspect works out."""
         case = Table(self.case(), f"{self.place}case '{self.case().get('name')}': ")
         if "nominal_room_from_ct" in case:
             return case.matrix("nominal_room_from_ct", 4, 4)
@@ -104,7 +104,7 @@ class Study:
 
 
 class Context:
-    """Each is asked for only where a format needs it; what is not known is refused with `why`."""
+    """Looks up CT, rig and frame only when a format needs them. One that is not known raises an error with `why`."""
 
     def __init__(self, ct=None, study=None, read_rig=None, camera=None):
         self.study, self.camera, self.read_rig = study, camera, read_rig
@@ -124,10 +124,10 @@ class Context:
             raise InputError(f"{self.ct_path}: is no CT, af-inspect says")
         size, spacing, origin, axes = (np.array(geometry[key], dtype=float)
                                        for key in ("size_voxels", "spacing_mm", "origin_mm", "direction"))
-        return Grid(size, spacing, origin, axes.T)  # of each axis of voxels
+        return Grid(size, spacing, origin, axes.T)  # axes.T: one column per axis of voxels
 
     def ct_frame_of_reference(self):
-        """DICOM's UID; empty where there is none."""
+        """DICOM's UID. Empty where there is none."""
         return "" if self.ct_path is None else self.facts().get("frame_of_reference_uid", "")
 
     def rig(self, why):

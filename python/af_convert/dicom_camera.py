@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The camera of a C-arm by the header of its DICOM image (PS3.3, C.8.7.5: XA positioner). Room: the patient's axes (LPS, mm)
-with the origin at the isocentre, the patient lying on the back, head first. The detector is in front of the chest at angles 0
-and moves to the patient's left (LAO) with a positive primary, to the head with a positive secondary angle."""
+"""The camera of a C-arm, from the header of its DICOM image (PS3.3, C.8.7.5: XA positioner). The room has the patient's
+axes (LPS, mm) and its origin at the isocentre. The patient lies on the back, head first. At angles 0 the detector is in
+front of the chest. A positive primary angle moves it to the patient's left (LAO), a positive secondary angle to the
+head."""
 import math
 
 import numpy as np
@@ -25,7 +26,7 @@ def is_dicom_camera(source):
     try:
         return text_of(read_header(source, False), "Modality") in MODALITIES
     except (FileError, InputError):
-        return True  # DICOM, but broken: reading it says why
+        return True  # broken DICOM: reading it says why
 
 
 def read_dicom_camera(source, options):
@@ -58,7 +59,7 @@ class _Reader:
         return self.stated
 
     def group(self, frame, macro):
-        """An element of one frame (from 1): of its functional groups, else of the shared ones, else None."""
+        """An element of one frame (from 1), taken from its functional groups or else from the shared ones; None without it."""
         frames = items_of(self.header, "PerFrameFunctionalGroupsSequence")
         own = items_of(frames[frame - 1], macro) if 1 <= frame <= len(frames) else []
         shared = items_of(self.header, "SharedFunctionalGroupsSequence")
@@ -66,13 +67,13 @@ class _Reader:
         return found[0] if found else None
 
     def number(self, frame, macro, keyword):
-        """The first number of a frame's functional group, or of the top level; None when there is none."""
+        """The first number in a frame's functional group, or else at the top level; None without one."""
         group = self.group(frame, macro) if macro else None
         numbers = (numbers_of(group, keyword, self.file) if group is not None else []) or numbers_of(self.header, keyword, self.file)
         return numbers[0] if numbers else None
 
     def distance(self, found, name, given, option):
-        """A distance of the header, or of the option, which must not contradict it."""
+        """A distance from the header, or else from the option. The option must not contradict the header."""
         if found is not None and found > 0:
             require(given is None or abs(given - found) <= 1e-3,
                     f"{self.file}: {option} = {given}: must agree with {name} = {found:g}")
@@ -152,8 +153,8 @@ class _Reader:
         return found
 
     def all_angles(self):
-        """Of each frame: one, unless the positioner moves. PS3.3, C.8.7.5.1.3: one increment per frame, or an offset from the
-        first angles for each."""
+        """The angles of every frame; a single entry unless the positioner moves. By PS3.3, C.8.7.5.1.3, there is one
+        increment per frame, or one offset from the first angles for each."""
         first = self.angles_of(1)
         if text_of(self.header, "PositionerMotion") != "DYNAMIC":
             return [first]
@@ -168,7 +169,7 @@ class _Reader:
                                                               offsets("PositionerSecondaryAngleIncrement", "(0018,1521)"))]
 
     def field_of_view_offset_mm(self, frame):
-        """Where the image's middle lies from the middle of the active detector: (column, row) mm. 0 unless all is stated."""
+        """Where the image's middle lies from the middle of the active detector: (column, row) mm. 0 unless all are stated."""
         own = self.group(frame, "FieldOfViewSequence")
         view = own if own is not None and text_of(own, "FieldOfViewOrigin") else self.header
         pairs = []
@@ -182,7 +183,7 @@ class _Reader:
         offset = (origin - active_origin) * spacing + 0.5 * (self.size_px * self.spacing_mm - active)
         if not offset.any():
             return offset
-        # FieldOfViewOrigin is of the detector's own rows and columns, before the image was turned and flipped.
+        # FieldOfViewOrigin refers to the detector's own rows and columns, before the image was turned and flipped.
         turn = (numbers_of(view, "FieldOfViewRotation", self.file) or [0.0])[0]
         require(turn in (0, 180), f"{self.file}: FieldOfViewRotation (0018,7032) = {turn:g}: must be 0 or 180 where "
                 "FieldOfViewOrigin is not the detector's middle")
@@ -190,7 +191,7 @@ class _Reader:
         return offset * [-1, 1] if text_of(view, "FieldOfViewHorizontalFlip") == "YES" else offset
 
     def oriented(self, column, row):
-        """Turns the axes around where PatientOrientation says that the image is stored so."""
+        """Reverses the axes that PatientOrientation says are reversed in the stored image."""
         letters = self.header.get("PatientOrientation") or []
         letters = [letters] if isinstance(letters, str) else list(letters)
         stated = [LETTERS.get(str(letter)[:1]) for letter in letters] + [None, None]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""DICOM headers by pydicom, distrusted."""
+"""DICOM headers, read by pydicom and not trusted."""
 import math
 import warnings
 
@@ -18,8 +18,8 @@ def is_dicom(source):
 
 
 def read_header(source, ends_with_pixels):
-    """The data set without its pixels. pydicom reads a file that is cut as far as it goes: what it holds must be complete, and
-    an image must reach its pixels."""
+    """The data set without its pixels. pydicom reads a truncated file as far as it goes. So this checks that every element
+    is complete, and that an image reaches its pixels."""
     reached = []
 
     def stop(tag, vr, length):
@@ -72,7 +72,7 @@ def _value(dataset, keyword):
 
 
 def numbers_of(dataset, keyword, place):
-    """Finite numbers; none where the element is absent or empty."""
+    """Finite numbers. The list is empty where the element is absent or empty."""
     value = _value(dataset, keyword)
     if value is None or value == "":
         return []

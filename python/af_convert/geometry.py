@@ -18,7 +18,7 @@ def _vector(*values):
 
 @dataclass
 class Camera:
-    """Detector coordinates are (column, row), integers are pixel centres; everything is of undistorted images."""
+    """Detector coordinates are (column, row), and integers are pixel centres. They refer to undistorted images."""
     name: str = ""
     source_point: np.ndarray = _vector(0, 0, 0)
     detector_origin_point: np.ndarray = _vector(0, 0, 0)  # centre of pixel (0, 0)
@@ -65,7 +65,7 @@ class Camera:
         return direction / np.linalg.norm(direction)
 
     def stored_from_ideal(self, pixel):
-        """Where the X-ray as it is stored shows what an undistorted one shows at `pixel`."""
+        """Where the stored X-ray shows what an undistorted one shows at `pixel`."""
         k = pinhole_of(self)[0]
         focal, center = np.diag(k)[:2], k[:2, 2]
         return _distorted(self.distortion, (np.asarray(pixel) - center) / focal)[0] * focal + center
@@ -76,7 +76,7 @@ def vector_text(values):
 
 
 def _distorted(c, at):
-    """The distorted place of a normalised point, and whether the map keeps its sides there."""
+    """The distorted place of a normalised point, and whether the map keeps orientation there."""
     k1, k2, p1, p2, k3, k4, k5, k6 = c
     x, y = at
     r2 = x * x + y * y
@@ -108,7 +108,7 @@ def _distortion_problem(camera):
 
 
 def camera_problems(camera):
-    """What keeps rig.toml from stating a camera; each names key, value and constraint."""
+    """The reasons why rig.toml cannot state a camera. Each names key, value and constraint."""
     found = []
 
     def add(key, values, constraint):
@@ -137,7 +137,7 @@ def camera_problems(camera):
 
 
 def with_clean_axes(camera):
-    """Axes exactly unit and orthogonal; those that are keep their bits."""
+    """The camera with exactly unit and orthogonal axes. Axes that are so already keep their bits."""
     camera = copy.deepcopy(camera)
 
     def unit(direction):
@@ -152,8 +152,8 @@ def with_clean_axes(camera):
 
 
 def camera_from_pinhole(name, k, rotation, translation, column_spacing_mm, size_px):
-    """The camera with (column, row, 1) ~ K (R x + t), its detector |K_00| column_spacing_mm behind the source. A negative
-    focal length turns an axis of the detector round."""
+    """The camera with (column, row, 1) ~ K (R x + t), whose detector is |K_00| column_spacing_mm behind the source. A
+    negative focal length reverses an axis of the detector."""
     place = f"camera '{name}': "
 
     def fail(what, values, constraint):
@@ -179,7 +179,7 @@ def camera_from_pinhole(name, k, rotation, translation, column_spacing_mm, size_
 
 
 def pinhole_of(camera):
-    """K, R, t; a mirrored camera has a negative focal length along columns."""
+    """K, R and t. A mirrored camera has a negative focal length along columns."""
     sign = -1.0 if camera.is_mirrored else 1.0
     rotation = np.array([sign * camera.column_direction, camera.row_direction, camera.beam_direction])
     to_source = camera.source_point - camera.detector_origin_point
@@ -191,7 +191,7 @@ def pinhole_of(camera):
 
 
 def camera_from_matrix(name, matrix, spacing_mm, size_px, front_point):
-    """The camera of pixels from room mm, in front of which `front_point` lies."""
+    """The camera of a matrix from room mm to pixels. `front_point` lies in front of it."""
     place = f"camera '{name}': projection_matrix"
     matrix = np.array(matrix, dtype=float)
     if matrix[2] @ np.append(front_point, 1) < 0:
@@ -223,7 +223,7 @@ def camera_from_matrix(name, matrix, spacing_mm, size_px, front_point):
 
 
 def with_column_spacing(camera, column_spacing_mm):
-    """The same rays, the detector moved along the beam."""
+    """The camera with the same rays and its detector moved along the beam."""
     factor = column_spacing_mm / camera.pixel_spacing_mm[0]
     moved = copy.deepcopy(camera)
     moved.pixel_spacing_mm = factor * camera.pixel_spacing_mm
@@ -246,7 +246,7 @@ def rotation_zyx(angles_rad):
 
 
 def angles_zyx(rotation):
-    """The inverse of rotation_zyx(); rz = 0 at gimbal lock."""
+    """The inverse of rotation_zyx(), with rz = 0 at gimbal lock."""
     cos_y = math.hypot(rotation[0, 0], rotation[1, 0])
     z = 0.0 if cos_y < 1e-12 else math.atan2(rotation[1, 0], rotation[0, 0])
     sin_z, cos_z = math.sin(z), math.cos(z)
@@ -262,7 +262,7 @@ def quaternion_rotation(w, x, y, z):
 
 
 def vector_rotation(vector):
-    """The rotation of an axis times its angle in radians."""
+    """The rotation of a vector that is its axis times its angle in radians."""
     angle = np.linalg.norm(vector)
     if angle == 0:
         return np.eye(3)
@@ -290,7 +290,7 @@ def inverse(pose):
 
 
 def rigid(matrix, place):
-    """A 4x4 that is rigid to 1e-5, made exactly so."""
+    """The exactly rigid 4x4 nearest to one that is rigid to 1e-5."""
     matrix = np.array(matrix, dtype=float)
     rotation = matrix[:3, :3]
     if not np.all(np.isfinite(matrix)):

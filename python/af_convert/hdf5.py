@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Small HDF5 files in memory. Reading is done by a child process with little memory and time, whose crash is an error of the
-file: libhdf5 does not survive every damaged one."""
+"""Small HDF5 files in memory. A child process with little memory and time reads them, because libhdf5 does not survive
+every damaged file. Its crash counts as an error in the file."""
 import io
 import json
 import os
@@ -13,9 +13,9 @@ import numpy as np
 from af_programs.errors import FileError
 
 MARK = b"\x89HDF\r\n\x1a\n"
-MOST_NUMBERS = 16  # of a dataset that is read
+MOST_NUMBERS = 16  # in a dataset that is read
 MOST_TEXT_BYTES = 1024
-MOST_BYTES_OF_CHILD = 1 << 30  # beyond what the process has
+MOST_BYTES_OF_CHILD = 1 << 30  # beyond what the parent has
 MOST_SECONDS = 20
 
 
@@ -24,8 +24,9 @@ def is_hdf5(source):
 
 
 def datasets(source, groups_of):
-    """The datasets of groups of a file: {"/group": {"name": value}}, value a list of its numbers as (extents, numbers), a text,
-    or None for what is neither or too large. `groups_of(file)` names the groups, in the child. FileError for damaged files."""
+    """The datasets in groups of a file: {"/group": {"name": value}}. A value is a list of numbers as (extents, numbers), a
+    text, or None for anything else or anything too large. `groups_of(file)` names the groups, in the child process. Raises
+    FileError for damaged files."""
     reader, writer = os.pipe()
     child = os.fork()
     if child == 0:
@@ -57,7 +58,7 @@ def _answer(writer, path, groups_of):
             with h5py.File(path, "r") as file:
                 answer = {"groups": {name: {key: _value(file, f"{name}/{key}") for key in file[name or "/"]}
                                      for name in groups_of(file)}}
-        except Exception as error:  # of h5py, any kind
+        except Exception as error:  # h5py raises any kind on damaged files
             answer = {"error": str(error)[:200]}
         with os.fdopen(writer, "wb") as pipe:
             pipe.write(json.dumps(answer).encode("utf-8", "replace"))
@@ -77,14 +78,14 @@ def _value(file, name):
     if kind == "S" and dataset.size == 1 and dataset.dtype.itemsize <= MOST_TEXT_BYTES or kind == "O" and dataset.size == 1:
         text = np.ravel(dataset[()])[0]
         return text.decode("utf-8", "replace")[:MOST_TEXT_BYTES] if isinstance(text, bytes) else str(text)[:MOST_TEXT_BYTES]
-    # A text as HDF5's C interface writes one: characters of one byte.
+    # HDF5's C interface writes a text as characters of one byte.
     if kind in "iu" and dataset.dtype.itemsize == 1 and dataset.size <= MOST_TEXT_BYTES:
         return bytes(np.ravel(dataset[()])).rstrip(b"\0").decode("utf-8", "replace")
     return None
 
 
 def file_bytes(fill):
-    """The bytes of a file that `fill(file)` fills; the same for the same content."""
+    """The bytes of a file that `fill(file)` fills. Equal content gives equal bytes."""
     memory = io.BytesIO()
     with h5py.File(memory, "w", track_order=False) as file:
         fill(file)

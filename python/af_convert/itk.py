@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""ITK transforms as text and in HDF5: x' = A (x - c) + c + t, c the fixed parameters. A pose is the resampling direction,
-ct_from_room in LPS mm: Slicer, applying it to the CT, shows the CT in the room."""
+"""ITK transforms as text and in HDF5: x' = A (x - c) + c + t, where c are the fixed parameters. A pose is stored in the
+resampling direction, ct_from_room in LPS mm, so that Slicer, applying it to the CT, shows the CT in the room."""
 import math
 
 import numpy as np
@@ -84,7 +84,7 @@ def read_itk_text(source, context):
 
 
 def _finite(word, place):
-    """In poses what is not finite is damage."""
+    """A number, which must be finite: in a pose anything else is damage."""
     try:
         return number_of(word, place)
     except InputError as error:
@@ -107,7 +107,7 @@ def is_itk_hdf5(source):
     try:
         return GROUP[1:] in hdf5.datasets(source, lambda file: [""])[""]
     except FileError:
-        return True  # damaged: reading it says so
+        return True  # it is damaged, and reading it says so
 
 
 def read_itk_hdf5(source, context):

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Projection matrices as text: pixels from room mm, three lines of four numbers per camera or twelve on one line. Comments
-that this project writes state what a matrix leaves open: # camera, # size_px, # pixel_spacing_mm, # isocenter_point."""
+"""Projection matrices as text: pixels from room mm, three lines of four numbers per camera or twelve on one line. In files
+that this project writes, comments state what a matrix leaves open: # camera, # size_px, # pixel_spacing_mm, #
+isocenter_point."""
 import numpy as np
 
 from af_programs.errors import FileError, InputError
@@ -45,7 +46,7 @@ def read_matrix_text(source, options):
 
 
 def _comment(line, place, following, stated):
-    """Of "# key numbers" those keys that matter here."""
+    """Takes what "# key numbers" states, for the keys that matter here."""
     words = line.words[1:] if line.words[:1] == ["#"] else line.words
     if len(words) < 2:
         return
@@ -67,7 +68,7 @@ def _comment(line, place, following, stated):
 
 
 def _camera(source, matrix, following, number):
-    """The side on which the object is becomes known with the isocentre only."""
+    """A camera whose front is still open: only the isocentre shows on which side the object is."""
     axis = matrix[2, :3]
     front = (1 - matrix[2, 3]) / (axis @ axis) * axis if axis @ axis > 0 else np.zeros(3)
     spacing = following.get("pixel_spacing_mm")
@@ -81,7 +82,7 @@ def _camera(source, matrix, following, number):
 
 
 def _focal_ratio(matrix):
-    """Focal length of columns by that of rows, in pixels."""
+    """The ratio of the focal lengths along columns and along rows, both in pixels."""
     with np.errstate(all="ignore"):
         depth = matrix[2, :3] / np.linalg.norm(matrix[2, :3])
         columns, rows = (np.linalg.norm(axis - axis @ depth * depth) for axis in matrix[:2, :3])

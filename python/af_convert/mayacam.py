@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MayaCam files: one camera each, from the calibration of biplane videoradiography (XROMM, XMALab) for Autoscoper. Neither
-states its unit of length nor the pixels' spacing."""
+"""MayaCam files, with one camera each. They come from the calibration of biplane videoradiography (XROMM, XMALab) for
+Autoscoper. Neither kind states its unit of length or the pixels' spacing."""
 import math
 
 import numpy as np
@@ -17,7 +17,7 @@ def is_mayacam2(source):
 
 
 def read_mayacam2(source, options):
-    """(column, row, 1) ~ K (R x + t), as OpenCV has it: row 0 on top, integers are pixel centres."""
+    """(column, row, 1) ~ K (R x + t), as in OpenCV: row 0 is on top, and integers are pixel centres."""
     lines = list(source.lines)
 
     def take(title, rows, columns):
@@ -49,9 +49,10 @@ def is_mayacam1(source):
 
 
 def read_mayacam1(source, options):
-    """Line 1: the source. Line 2: degrees about the camera's own axes x, y, z, turned about z first, then y, then x; the
-    camera looks along -z, y is up. Line 3: where Maya puts the film. Line 4: u0 and v0 (pixels from 1, v0 from the lowest
-    row upwards) and the focal length in pixels, of either sign. Line 5: the film's scale, columns and rows; 0 means 1024."""
+    """Line 1 is the source. Line 2 has degrees about the camera's own axes x, y, z; it is turned about z first, then y,
+    then x. It looks along -z, and y is up. Line 3 is the place of the film in Maya. Line 4 has u0 and v0 (pixels from 1, v0
+    from the lowest row upwards) and the focal length in pixels, of either sign. Line 5 is the film's scale in columns and
+    rows; 0 means 1024."""
     if len(source.lines) != 5:
         raise FileError(f"{source.name}: lines: expected 5 lines of 3 numbers, found {len(source.lines)}")
     place, angles, _, middle, film = (line_numbers(source, line, 3) for line in source.lines)

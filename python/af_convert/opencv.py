@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cameras in OpenCV's FileStorage YAML and in the plain YAML of ROS: camera matrix, R (3x3, or a rotation vector) and t, with
-(column, row, 1) ~ K (R x + t). The names of the keys are everybody's own; the usual ones are known. A number behind a name
-(K1, R2) tells several cameras of one file apart."""
+"""Cameras in OpenCV's FileStorage YAML and in the plain YAML of ROS. They have a camera matrix K, R (3x3, or a rotation
+vector) and t, with (column, row, 1) ~ K (R x + t). There is no standard for the names of the keys, so the usual ones are
+known. A number at the end of a name (K1, R2) tells several cameras in one file apart."""
 import re
 
 import numpy as np
@@ -16,7 +16,7 @@ from .source import is_number, number_of, numbers_text, size_of, toml_text
 MOST_BYTES = 1 << 20
 MOST_NUMBERS = 4096  # more than any matrix of a camera has
 MOST_NESTED = 50  # the scanner's time grows with the square
-# Lower case, without '_' and '-'. The first is the one in messages.
+# Lower case, without '_' and '-'. Messages show the first.
 MATRIX = "cameramatrix k m mtx intrinsic intrinsics intrinsicmatrix".split()
 ROTATION = "r rotation rotationmatrix rmat rvec rotationvector".split()
 TRANSLATION = "t tvec translation translationvector".split()
@@ -27,7 +27,7 @@ NEEDS_POSE = ("K alone does not say where the camera stands; add R (3x3, or rvec
 
 
 class _Loader(yaml.SafeLoader):
-    """Nodes only: nothing is constructed, and no alias expanded."""
+    """Reads nodes only. It constructs nothing and expands no alias, so that a file cannot run code or grow."""
 
     def fetch_flow_collection_start(self, TokenClass):
         if self.flow_level == MOST_NESTED:
@@ -41,7 +41,7 @@ class _Loader(yaml.SafeLoader):
 
 
 def plain_key(key):
-    """A key without case, '_' and '-', its trailing number apart."""
+    """A key without case, '_' and '-', and its trailing number."""
     plain = key.replace("_", "").replace("-", "").lower()
     name = plain.rstrip("0123456789")
     return name, plain[len(name):]
@@ -56,7 +56,7 @@ class _Values:
 
     def __init__(self, source):
         self.source, self.entries, self.taken = source, {}, set()
-        # OpenCV's directive has a colon for a blank.
+        # OpenCV's directive has a colon in place of a blank.
         text = re.sub(r"^%YAML[: ].*$", "", source.limited_text(MOST_BYTES), count=1, flags=re.MULTILINE)
         try:
             root = yaml.compose(text, Loader=_Loader)
@@ -87,7 +87,7 @@ class _Values:
         return None
 
     def find(self, names, number):
-        """The value of that camera, or the one that all cameras share."""
+        """The value for that camera, or the one that all cameras share."""
         own = self.find_exactly(names, number)
         return own if own is not None else self.find_exactly(names, "")
 
@@ -98,8 +98,8 @@ class _Values:
         return value
 
     def of_camera(self, names, number):
-        """An unnumbered R or t is that of the only camera; beside several it is of a stereo calibration, the second camera's
-        relative to the first, and not taken."""
+        """An unnumbered R or t belongs to the only camera. Beside several cameras it comes from a stereo calibration: it is
+        that of the second camera relative to the first, and is not taken."""
         if len(self.numbers) == 1:
             return self.required(names, number, NEEDS_POSE)
         value = self.find_exactly(names, number)
@@ -154,7 +154,7 @@ def _rotation(values, node):
 
 
 def _size(values, number):
-    """Columns and rows; None where they are not stated."""
+    """Columns and rows. None where they are not stated."""
     width, height = values.find(["imagewidth", "width"], number), values.find(["imageheight", "height"], number)
     both = values.find(["imagesize", "size", "resolution"], number)
     if both is not None:
@@ -165,7 +165,7 @@ def _size(values, number):
 
 
 def _distortion(values, number, k):
-    """OpenCV's first eight coefficients; more, of thin prisms and tilted sensors, must be 0."""
+    """OpenCV's first eight coefficients. Further ones, for thin prisms and tilted sensors, must be 0."""
     model = values.find(["distortionmodel"], number)
     if model is not None and values.text(model) not in ("plumb_bob", "rational_polynomial"):
         raise InputError(f"{values.place(model)}: distortion_model = '{shown(values.text(model))}': must be plumb_bob or "
@@ -180,7 +180,7 @@ def _distortion(values, number, k):
         raise InputError(f"{values.place(node)}: distortion of thin prisms or tilted sensors (s1 ... s4, tx, ty) that is not 0 is "
                          "not supported: undistort the images first")
     distortion[:len(numbers[:8])] = numbers[:8]
-    # A negative focal length along rows turns x and y of our normalised image round.
+    # A negative focal length along rows reverses x and y of our normalised image.
     return with_rows_flipped(distortion) if k[1, 1] < 0 else distortion
 
 

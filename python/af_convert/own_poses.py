@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The project's own ways to write a pose: room_from_ct as JSON, TOML, plain numbers and CSV."""
+"""The project's own formats of a pose: room_from_ct as JSON, TOML, plain numbers and CSV."""
 import csv
 import json
 
@@ -27,7 +27,7 @@ def read_json(source, context):
         raise FileError(f"{source.name}: is not JSON: {shown(str(error), 100)}") from error
     require(KEY in values, f'{source.name}: has no "{KEY}"')
     pose = Table(values, f"{source.name}: ").matrix(KEY, 4, 4)
-    # A file without a format, as result.json states it, is not this project's.
+    # A result.json states its format, so a file without one is not this project's.
     unread = [] if "format" in values else [shown(key) for key in values if key != KEY]
     return [(1, rigid(pose, f"{source.name}: {KEY}"))], unread_note(source, unread)
 
@@ -56,7 +56,7 @@ def is_plain(source):
 
 
 def read_plain(source, context):
-    """Row by row; what follows a # on its line is a comment."""
+    """Numbers row by row. A # begins a comment, up to the end of its line."""
     words = _uncommented(source)
     if len(words) != 16:
         raise FileError(f"{source.name}: pose: expected 16 numbers of {KEY}, row by row, found {len(words)}")
@@ -77,8 +77,8 @@ def is_csv(source):
 
 
 def _records(source):
-    """The header, and (line, fields) below. Where the header has semicolons and no comma, semicolons separate fields and
-    numbers may have a decimal comma, as a spreadsheet of such a country writes them."""
+    """The header, and (line, fields) below it. If the header has semicolons and no comma, semicolons separate the fields
+    and numbers may have a decimal comma, because spreadsheets in some countries write so."""
     text = source.text
     header = text.partition("\n")[0]
     has_semicolons = ";" in header and "," not in header
@@ -135,7 +135,7 @@ def read_csv(source, context):
 
 
 def write_csv(poses, context, numbers):
-    """With start_index where rows or frames of the file had no pose, so that the others keep their places."""
+    """Adds start_index if rows or frames of the file had no pose, so that the others keep their places."""
     is_whole = numbers == list(range(1, len(numbers) + 1))
     text = ",".join(([] if is_whole else ["start_index"]) + _matrix_columns(3)) + "\n"
     for number, pose in zip(numbers, poses):
@@ -145,7 +145,7 @@ def write_csv(poses, context, numbers):
 
 
 class Frame:
-    """What six numbers are relative to: R0, c and r of x_room = r + t + Rz Ry Rx R0 (x - c)."""
+    """The origin of six numbers: R0, c and r in x_room = r + t + Rz Ry Rx R0 (x - c)."""
 
     def __init__(self, nominal, center_ct_mm):
         self.rotation, self.center = nominal[:3, :3], np.asarray(center_ct_mm)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cameras of plastimatch: the text that `plastimatch drr` writes beside each projection, and the command itself. Room:
-DICOM's patient frame (LPS, mm). The normal points from the isocentre to the source, which is SAD away from it; the detector
-stands SID from the source; view-up points to the top row. "row col" in its help is columns first in effect."""
+"""Cameras of plastimatch: the text that `plastimatch drr` writes beside each projection, and the command itself. The room
+is DICOM's patient frame (LPS, mm). The normal points from the isocentre to the source, at the distance SAD. The detector
+stands SID from the source. View-up points to the top row. The help says "row col" but means columns first."""
 import re
 import shlex
 
@@ -14,7 +14,7 @@ from .rig import StatedRig, StatedCamera, one_camera, require
 from .source import is_number, line_numbers, lines_of, number_text, numbers_of, numbers_text, rows_text, size_of
 
 LINES = 16
-# What decides no camera: the image's values, its files, how it is computed.
+# Options without effect on the camera: they concern the image's values, its files and how it is computed.
 INDIFFERENT = set("-A --threading --autoscale --autoscale-range -e --exponential -G --geometry-only -H --hu-conversion -I "
                   "--input -i --algorithm -O --output -P --preprocess -s --intensity-scale -t --output-format".split())
 LONG_NAMES = {"-n": "--nrm", "-r": "--dim", "-z": "--detector-size", "-c": "--image-center", "-o": "--isocenter",
@@ -28,7 +28,7 @@ def is_plastimatch(source):
 
 
 def read_plastimatch(source, options):
-    """Pixels are the image centre of line 1 plus (P x) / w. Columns are the first coordinate."""
+    """Pixels are the image centre in line 1 plus (P x) / w. Columns are the first coordinate."""
     lines = source.lines
     if len(lines) < LINES:
         raise FileError(f"{source.name}: truncated: a projection file has {LINES} lines")
@@ -41,7 +41,7 @@ def read_plastimatch(source, options):
     def rows(first, count, columns):
         return np.array([line_numbers(source, line, columns) for line in lines[first:first + count]])
     center, matrix, sad = rows(0, 1, 2)[0], rows(1, 3, 4), rows(4, 1, 1)[0, 0]
-    rows(5, 1, 1), rows(6, 1, 3)  # SID and normal, which the matrices hold, too
+    rows(5, 1, 1), rows(6, 1, 3)  # SID and normal, which the matrices hold too
     extrinsic, intrinsic = rows(8, 4, 4), rows(13, 3, 4)
     product = intrinsic @ extrinsic
     for i in range(3):
@@ -77,7 +77,7 @@ def is_plastimatch_command(source):
 
 
 def _words_of_drr(source):
-    """The words from "drr" on of the only command that has it."""
+    """The words from "drr" on, in the only command that has it."""
     lexer = shlex.shlex(source.limited_text(1 << 20).replace("\\\r\n", " ").replace("\\\n", " "), posix=True, punctuation_chars=";&\n")
     lexer.whitespace = " \t\r"
     lexer.whitespace_split = True
@@ -125,7 +125,7 @@ def read_plastimatch_command(source, options):
     require(detector_mm.min() > 0 and sad > 0 and sid > 0, f"{source.name}: --detector-size, --sad and --sid must be above 0")
     size = size_of(size, f"{source.name}: --dim")
     beam = -normal / np.linalg.norm(normal)
-    # From behind the detector the top is up and, along the beam, columns run to the right.
+    # Seen along the beam with the top row up, columns run to the right.
     column = np.cross(beam, up) / np.linalg.norm(np.cross(beam, up))
     row = np.cross(beam, column)
     spacing = detector_mm / size

@@ -17,15 +17,15 @@ from .rig_toml import write_rig_toml
 from .source import Source
 from .study_toml import study_text
 
-# Formats that a written file's ending names.
+# The formats that the ending of a written file chooses.
 ENDINGS = {".csv": "csv", ".tfm": "itk", ".tra": "autoscoper"}
 SHIPPED_RIGS = ("c-arm-12in", "treatment-room")
 
 
-def _numbers(count, low, high, of=float):
+def _numbers(count, low, high, convert=float):
     def parse(text):
         try:
-            values = [of(word) for word in text.split(",")]
+            values = [convert(word) for word in text.split(",")]
         except ValueError:
             values = []
         if len(values) != count or not all(math.isfinite(value) and low <= value <= high for value in values):
@@ -39,7 +39,7 @@ def parser():
         prog="af-convert", allow_abbrev=False,
         description="Converts cameras, poses and studies of other programs to rig.toml, poses and study.toml, and back. A file's "
         "content decides what it is.")
-    # So that -10.5,20,30 is a value, with a blank before it, too.
+    # This makes -10.5,20,30 a value even after a blank.
     result._negative_number_matcher = re.compile("-[0-9.]")
     result.add_argument("files", nargs="+", metavar="FILE", help="camera files to make one rig of, each of any of the formats; or a "
                         "file of poses; or a study.toml, for its rig")
@@ -52,7 +52,7 @@ def parser():
                         "study.toml and rig.toml, of cameras and --ct")
     result.add_argument("-o", "--output", metavar="OUT", help="file to write; of formats that hold one camera, one file per camera: "
                         "OUT-NAME. Without it texts are printed")
-    rig = result.add_argument_group("What camera files leave open")
+    rig = result.add_argument_group("Settings that camera files leave open")
     rig.add_argument("--rig-names", type=lambda text: text.split(","), metavar="NAME,...",
                      help="names of the cameras, in the files' order; without it from the files' names")
     rig.add_argument("--rig-size-px", type=_numbers(2, 1, 32768, int), metavar="COLUMNS,ROWS", help="size of the images")
@@ -75,8 +75,8 @@ def parser():
                      "not state them")
     rig.add_argument("--rig-flip", choices=("rows", "columns"), metavar="AXIS", help="rows or columns: the X-rays are stored with "
                      "them in the other order than the files' convention has it")
-    of_pose = result.add_argument_group("What a pose is of")
-    of_pose.add_argument("--study", metavar="STUDY.toml", help="study whose CT, cameras and nominal pose it is of")
+    of_pose = result.add_argument_group("CT and cameras of a pose")
+    of_pose.add_argument("--study", metavar="STUDY.toml", help="study with the CT, cameras and nominal pose")
     of_pose.add_argument("--case", metavar="NAME", help="its case; without it the only one")
     of_pose.add_argument("--ct", metavar="CT", help="the CT, for Autoscoper, DiffDRR and DICOM, read by af-inspect")
     of_pose.add_argument("--rig", metavar="RIG", help="the cameras, for DiffDRR: any camera files, with commas between them")
@@ -112,7 +112,7 @@ def rig_options(options):
 
 
 def rig_paths(name):
-    """A rig's files: of a name, or of several with commas between them."""
+    """A rig's files, from one name or from several with commas between them."""
     if name in SHIPPED_RIGS and not os.path.exists(name):
         raise InputError(f"{name}: is a shipped rig: af-inspect --template prints its form, a study's folder holds its rig.toml")
     return [name] if os.path.exists(name) else [part for part in name.split(",") if part]
@@ -127,7 +127,7 @@ def context_of(options):
 
 
 def kinds_of(options):
-    """The files by what they are: cameras, poses, studies."""
+    """The files by their kind: cameras, poses, studies."""
     cameras, poses, studies = [], [], []
     name = options.source_format
     for path in options.files:
@@ -184,7 +184,7 @@ def study_outputs(options, cameras, poses, output):
 
 
 def write(path, content):
-    """The file appears complete. Without a path, to standard output."""
+    """Writes a file that appears only when complete. Without a path, writes to standard output."""
     content = content if isinstance(content, bytes) else content.encode("utf-8")
     if path is None:
         sys.stdout.buffer.write(content)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The .rad text beside a raw projection that xReg takes: size, pixel spacing, where the source is, and TPosition, which takes
-the detector's frame to the world (mm): origin at the centre of pixel (0, 0), x along columns, y along rows, z to the source."""
+"""The .rad text beside a raw projection that xReg takes: size, pixel spacing, where the source is, and TPosition. TPosition
+takes the detector's frame to the world (mm). That frame has its origin at the centre of pixel (0, 0), x along columns, y
+along rows and z to the source."""
 import numpy as np
 
 from af_programs.errors import FileError, shown

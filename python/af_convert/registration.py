@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""DICOM Spatial Registration objects (PS3.3, A.39 and C.20.2): for each frame of reference, the matrix that takes its points to
-the registered one, here the room's; mm."""
+"""DICOM Spatial Registration objects (PS3.3, A.39 and C.20.2). For each frame of reference they hold the matrix that takes
+its points to the registered frame, here the room's, in mm."""
 import hashlib
 import io
 
@@ -24,11 +24,11 @@ def is_registration(source):
     try:
         return text_of(read_header(source, False), "SOPClassUID") == SOP_CLASS
     except (FileError, InputError):
-        return SOP_CLASS.encode() in source.head  # damaged: reading it says so
+        return SOP_CLASS.encode() in source.head  # it is damaged, and reading it says so
 
 
 def _matrix_of(item, place):
-    """The matrices of an item are applied in their order; None where it has none."""
+    """The product of an item's matrices, which are applied in their order. None where it has none."""
     matrix = None
     for registration in items_of(item, "MatrixRegistrationSequence"):
         for one in items_of(registration, "MatrixSequence"):
@@ -42,9 +42,9 @@ def _matrix_of(item, place):
 
 
 def read_registration(source, context):
-    """Room is the object's own frame of reference, or that of its item whose matrix stands for it. The CT's item is the one with
-    the CT's UID where that is known, else the only one of another frame. Where the object's own frame is the CT's, its only
-    other one is the room's."""
+    """The room is the object's own frame of reference, or that of the item whose matrix stands for it. The CT's item is the
+    one with the CT's UID if that is known, or else the only one with another frame. If the object's own frame is the CT's,
+    its only other one is the room's."""
     header = read_header(source, False)
     sop_class = text_of(header, "SOPClassUID")
     require(sop_class == SOP_CLASS, f"{source.name}: SOP class = {shown(sop_class)}: must be {SOP_CLASS}, a spatial registration")
@@ -78,17 +78,17 @@ def read_registration(source, context):
         notes.append(f"{source.name}: the frame of reference {ct} is taken as the CT's, {of_ct}")
     notes += [f"{source.name}: the matrix of the frame of reference {uid} is not read: it is neither the CT's nor the object's own"
               for uid in uids if uid not in (ct, room)]
-    # The frame that the object registers to need not be listed.
+    # The object's own frame need not be listed.
     return [(1, inverse(matrices.get(room, np.eye(4))) @ matrices.get(ct, np.eye(4)))], notes
 
 
 def _uid_of(content):
-    """A UID of 120 bits of a hash (PS3.5, B.2), so that equal content has an equal UID."""
+    """A UID made from 120 bits of a hash (PS3.5, B.2), so that equal content has an equal UID."""
     return f"2.25.{int(hashlib.sha256(content.encode()).hexdigest()[:30], 16)}"
 
 
 def _decimal_string(value):
-    """At most 16 characters (PS3.5, 6.2): 1e-9 of a rotation, 1e-7 mm or better."""
+    """A number in at most 16 characters (PS3.5, 6.2), which keeps 1e-9 of a rotation and 1e-7 mm or better."""
     return next((text for digits in range(17, 5, -1) if len(text := f"{value + 0.0:.{digits}g}") <= 16), "0")
 
 
@@ -105,8 +105,8 @@ def _item(uid, matrix):
 
 
 def write_registration(poses, context):
-    """Two items: the room's, the identity, and the CT's, room_from_ct. UIDs that are not known are made of the pose: the same
-    pose gives the same file."""
+    """Writes two items: the room's with the identity, and the CT's with room_from_ct. UIDs that are not known are derived
+    from the pose, so that the same pose gives the same file."""
     pose = poses[0]
     matrix = "\\".join(_decimal_string(value) for value in np.ravel(pose))
     ct_uid = context.ct_frame_of_reference() or _uid_of("ct " + matrix)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One rig of the cameras that files state, completed from the options."""
+"""One rig from the cameras that files state, completed from the options."""
 import copy
 import pathlib
 from dataclasses import dataclass, field
@@ -47,7 +47,7 @@ class StatedRig:
 
 @dataclass
 class RigOptions:
-    """What files leave open. Nothing here may contradict what a file states."""
+    """Settings that files leave open. None of them may contradict what a file states."""
     names: list = None
     size_px: list = None
     pixel_spacing_mm: list = None
@@ -81,7 +81,7 @@ def point_text(point):
 
 
 def nearest_point_of_central_rays(cameras):
-    """The point with the least sum of squared distances; None where the rays are parallel to 1e-6."""
+    """The point with the least sum of squared distances. None where the rays are parallel to 1e-6."""
     total, moment = np.zeros((3, 3)), np.zeros(3)
     for camera in cameras:
         direction = camera.central_direction()
@@ -94,7 +94,7 @@ def nearest_point_of_central_rays(cameras):
 
 
 def completed_rig(stated, options):
-    """The rig, and warnings of what was assumed."""
+    """The rig, and warnings that say what was assumed."""
     return _Completion(stated, options).run()
 
 
@@ -162,7 +162,7 @@ class _Completion:
             if problem := name_problem(name):
                 raise InputError(f"{self.files[i]}: camera name = {name!a}: {problem}")
             stem, n = name, 2
-            # Two files of the same name in two folders; names that somebody stated must differ.
+            # Two files in two folders may have the same name. Names that somebody stated must differ.
             while name in taken and not stated.has_name and not names:
                 name, n = f"{stem}-{n}", n + 1
             taken.add(name)
@@ -239,7 +239,7 @@ class _Completion:
             camera = stated.camera
             if camera.depth_mm(self.isocenter) > 0:
                 continue
-            if not stated.knows_front:  # the same lines of sight, source and detector on the other sides
+            if not stated.knows_front:  # keeps the lines of sight; source and detector change sides
                 camera.detector_origin_point = 2 * camera.source_point - camera.detector_origin_point
                 camera.column_direction, camera.row_direction = -camera.column_direction, -camera.row_direction
             if not camera.depth_mm(self.isocenter) > 0 and not stated.has_spacing:
@@ -283,7 +283,7 @@ def with_rows_flipped(distortion):
 
 
 def one_camera(source, camera, **flags):
-    """What a file of one camera states."""
+    """What a file with one camera states."""
     return StatedRig([StatedCamera(camera, **flags)], file=source.name)
 
 

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""RTK's ThreeDCircularProjectionGeometry (IEC 61217). Room: RTK's fixed frame, mm, origin at the isocentre, y the axis of
-rotation; at gantry angle 0 the source is at z = +SID. With R = Rz(-InPlaneAngle) Rx(-OutOfPlaneAngle) Ry(-GantryAngle) the
-source is at (SourceOffsetX, SourceOffsetY, SID) of the rotated frame and the detector's point (u, v) mm at
-(u + ProjectionOffsetX, v + ProjectionOffsetY, SID - SDD). Columns run along u and rows along v: RTK's images are mirrored."""
+"""RTK's ThreeDCircularProjectionGeometry (IEC 61217). The room is RTK's fixed frame in mm. Its origin is the isocentre, y
+is the axis of rotation, and at gantry angle 0 the source is at z = +SID. With R = Rz(-InPlaneAngle) Rx(-OutOfPlaneAngle)
+Ry(-GantryAngle) the source is at (SourceOffsetX, SourceOffsetY, SID) in the rotated frame, and the detector's point (u, v)
+mm is at (u + ProjectionOffsetX, v + ProjectionOffsetY, SID - SDD). Columns run along u and rows along v, so RTK's images
+are mirrored."""
 import math
 import xml.parsers.expat
 from dataclasses import dataclass, field
@@ -19,7 +20,7 @@ ROOT = "RTKThreeDCircularGeometry"
 MOST_PROJECTIONS = 100000
 MOST_ELEMENTS = 1000000
 DEEPEST = 32
-# Those of collimators do not matter to where pixels see.
+# Collimators do not change the rays of pixels, so their elements are known but not used.
 KNOWN = {name.lower(): name for name in """SourceToIsocenterDistance SourceToDetectorDistance GantryAngle OutOfPlaneAngle
 InPlaneAngle SourceOffsetX SourceOffsetY ProjectionOffsetX ProjectionOffsetY RadiusCylindricalDetector CollimationUInf
 CollimationUSup CollimationVInf CollimationVSup""".split()} | {"angle": "GantryAngle"}
@@ -39,7 +40,7 @@ class Element:
 
 
 def parse_xml(source):
-    """The root element. Entities are refused before they are declared."""
+    """The root element. Declarations of entities are refused, so that they cannot expand."""
     parser = xml.parsers.expat.ParserCreate()
     document = Element("", 0, {})
     stack, count = [document], 0
@@ -80,7 +81,7 @@ def read_rtk(source, options):
     version = root.attributes.get("version", "")
     require(version in ("2", "3"), f"{source.name}:{root.line}: version = '{shown(version, 20)}': must be 2 or 3")
     stated = StatedRig(isocenter_point=np.zeros(3), file=source.name)
-    values = {}  # what stands before a projection, in other projections too, holds for it
+    values = {}  # a value holds for all later projections until another replaces it
     for element in root.children:
         if element.name.lower() == "projection":
             stated.cameras.append(_projection(source, element, values))
@@ -99,7 +100,7 @@ def _refuse(source, element):
 
 
 def _take_number(source, element, values):
-    """As RTK compares names: whatever their case."""
+    """Takes an element's number. Like RTK, it ignores the case of names."""
     name = KNOWN.get(element.name.lower())
     if name is None:
         _refuse(source, element)
@@ -135,7 +136,7 @@ def _camera(values, place):
 
 
 def _check_matrix(source, element, camera):
-    """The matrix that RTK stores beside the parameters, from fixed mm to detector mm, must be theirs."""
+    """Checks that the matrix that RTK stores beside the parameters, from fixed mm to detector mm, follows from them."""
     place = f"{source.name}:{element.line}: Matrix"
     numbers = numbers_of([word for line in lines_of(element.text) for word in line.words], place)
     if len(numbers) != 12:
@@ -148,7 +149,7 @@ def _check_matrix(source, element, camera):
 
 
 def _angles_deg(axes):
-    """Gantry, out of plane, in plane. Of a beam along y one is free."""
+    """The angles gantry, out of plane, in plane. A beam along y leaves one of them free."""
     out_of_plane = -math.asin(np.clip(axes[2, 1], -1, 1))
     if math.hypot(axes[2, 0], axes[2, 2]) < 1e-9:
         return 0.0, math.degrees(out_of_plane), -math.degrees(math.atan2(axes[1, 0], axes[0, 0]))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A file as the formats see it, and its numbers."""
+"""A file as the formats see it, and the numbers in it."""
 import functools
 import math
 import pathlib
@@ -17,7 +17,7 @@ _LINE_END = re.compile(r"\r\n|\r|\n")
 
 
 class Line:
-    """A line that holds anything: its number from 1, its text, its words between blanks, commas, semicolons, brackets."""
+    """A line that is not empty: its number from 1, its text, and its words between blanks, commas, semicolons, brackets."""
 
     def __init__(self, number, text):
         self.number, self.text = number, text
@@ -48,7 +48,7 @@ class Source:
         self.lines = lines_of(self.text)
 
     def limited_text(self, most_bytes):
-        """The text, for parsers whose time grows fast."""
+        """The text, if it is short enough for parsers whose time grows fast."""
         if len(self.text) > most_bytes:
             raise InputError(f"{self.name}: has {len(self.text)} characters, more than {most_bytes} of a file of this kind")
         return self.text
@@ -87,14 +87,14 @@ def numbers_of(words, place):
 
 
 def line_numbers(source, line, count):
-    """Exactly `count` numbers of a line."""
+    """Exactly `count` numbers from a line."""
     if len(line.words) != count:
         raise FileError(f"{source.place(line)}: expected {count} numbers, found '{shown(line.text, 100)}'")
     return numbers_of(line.words, source.place(line))
 
 
 def size_of(numbers, place):
-    """Columns and rows of images."""
+    """The columns and rows of images."""
     for number in numbers:
         if not (1 <= number <= 32768) or number != math.floor(number):
             raise InputError(f"{place} = {number}: the image's size must be a whole number between 1 and 32768")

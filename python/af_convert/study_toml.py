@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""study.toml of cameras, a CT and a pose: what the files say, and lines to fill in for what they do not."""
+"""study.toml from cameras, a CT and a pose. It has what the files say, and lines to fill in where they say nothing."""
 import os
 
 from .dicom_header import is_dicom
@@ -8,7 +8,7 @@ from .source import Source, toml_numbers, toml_text
 
 
 def study_text(study, rig_name, rig, camera_files, ct, grid, pose):
-    """The text of `study`, a path; `camera_files` are X-rays where they are DICOM images, one per camera."""
+    """The text of the file `study`. `camera_files` are also the X-rays if they are DICOM images, one per camera."""
     folder = os.path.dirname(os.path.abspath(study))
 
     def relative(path):

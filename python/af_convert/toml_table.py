@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Values of TOML texts, by key."""
+"""The values in TOML texts, by key."""
 import math
 import tomllib
 
@@ -19,7 +19,7 @@ def parse_toml(source):
 
 
 class Table:
-    """A table whose keys are taken one by one; refuse_unknown() names those that were not."""
+    """A table whose keys are taken one by one. refuse_unknown() names those that were not taken."""
 
     def __init__(self, values, place):
         self.values, self.place, self.known = values, place, set()
@@ -67,7 +67,7 @@ class Table:
         return value
 
     def vector(self, key, counts, default=REQUIRED):
-        """A list of numbers; `counts` is how many there may be."""
+        """A list of numbers. `counts` holds the permitted lengths."""
         value = self.get(key, default)
         if key not in self:
             return value
@@ -77,7 +77,7 @@ class Table:
         return np.array([self._number(key, number) for number in value])
 
     def matrix(self, key, rows, columns, default=REQUIRED):
-        """Lists of numbers; any number of rows, at least one, where `rows` is None."""
+        """Lists of numbers. If `rows` is None, there may be any number of rows, but at least one."""
         value = self.get(key, default)
         if key not in self:
             return value

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cameras of xReg in HDF5: its projection data (groups proj-000, proj-001 ... with a group cam each), a camera alone, and the
-group proj-params of the DeepFluoro data set. `extrinsic` takes world mm to the camera's frame, `intrinsic` that to pixels.
-cam-coord-frame-type says which frame: the source at the origin and the detector at +z or at -z (that of DeepFluoro), or the
-origin on the detector and the source at +z."""
+"""Cameras of xReg in HDF5: its projection data (groups proj-000, proj-001 ... with a group cam each), a camera alone, and
+the group proj-params of the DeepFluoro data set. `extrinsic` takes world mm to the camera's frame, and `intrinsic` takes
+that frame to pixels. cam-coord-frame-type says which frame it is. Either the source is at the origin and the detector at +z
+or at -z (as in DeepFluoro), or the origin is on the detector and the source at +z."""
 import numpy as np
 
 from af_programs.errors import FileError, shown
@@ -88,8 +88,8 @@ def _camera(source, groups, group, notes):
     require(spacing.min() > 0, place(prefix + "col-spacing") + ": spacings must be above 0")
     frame = groups[group].get(FRAME_TYPE, FRAMES[1])
     require(frame in FRAMES, f"{place(FRAME_TYPE)} = '{shown(str(frame))}': must be one of " + ", ".join(FRAMES))
-    # With z along the beam and the source at the origin. Of a point x in xReg's frame y = HALF_TURN x has its depth in z, and
-    # x_0 / z = y_0 / y_2 where z = x_2 and -y_0 / y_2 where z = focal length - x_2.
+    # z runs along the beam and the source is at the origin. For a point x in xReg's frame y = HALF_TURN x has its depth in
+    # z, and x_0 / z = y_0 / y_2 where z = x_2 and -y_0 / y_2 where z = focal length - x_2.
     rotation, translation, k = extrinsic[:3, :3], extrinsic[:3, 3], k.copy()
     if frame != FRAMES[0]:
         rotation, translation = HALF_TURN @ rotation, HALF_TURN @ translation

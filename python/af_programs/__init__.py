@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the programs in Python share."""
+"""Code that the programs in Python share."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Options of every program: --version, and --help-as markdown, man, bash, zsh, its options as other pages."""
+"""The options that every program has: --version, and --help-as markdown, man, bash or zsh, which prints its help as a page."""
 import argparse
 import re
 
@@ -21,7 +21,7 @@ def add_common_options(parser):
 
 
 def _entries(parser):
-    """(title, [(names, value, help, choices)]) of each group."""
+    """(title, [(names, value, help, choices)]) for each group."""
     for group in parser._action_groups:
         yield group.title, [(action.option_strings, "" if action.nargs == 0 else action.metavar or action.dest.upper(),
                              action.help[:1].upper() + action.help[1:], action.choices) for action in group._group_actions]
@@ -59,8 +59,9 @@ def _man(parser):
 
 
 def _bash(parser):
-    function, names = "_" + parser.prog.replace("-", "_"), " ".join(name for entry in _options(parser) for name in entry[0])
-    choices = "".join(f'    {" | ".join(names)}) names="{" ".join(of)}" ;;\n' for names, _, _, of in _options(parser) if of)
+    options = _options(parser)
+    function, names = "_" + parser.prog.replace("-", "_"), " ".join(name for entry in options for name in entry[0])
+    choices = "".join(f'    {" | ".join(names)}) names="{" ".join(values)}" ;;\n' for names, _, _, values in options if values)
     return (f"# bash completion of {parser.prog}, made by {parser.prog} --help-as bash\n{function}() {{\n"
             '  local current=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD-1]} names=""\n'
             f'  COMPREPLY=()\n  case "$before" in\n{choices}  esac\n  [[ -n "$names" || "$current" != -* ]] || names="{names}"\n'
@@ -72,8 +73,8 @@ def _zsh(parser):
     lines = []
     for names, value, help_text, choices in _options(parser):
         text = re.sub(r"([\[\]:\\])", r"\\\1", help_text).replace("'", "'\\''")
-        of = f":{value.lower()}:" + (f"({' '.join(choices)})" if choices else "_files") if value else ""
-        lines += [f"'{name}[{text}]{of}'" for name in names]
+        argument = f":{value.lower()}:" + (f"({' '.join(choices)})" if choices else "_files") if value else ""
+        lines += [f"'{name}[{text}]{argument}'" for name in names]
     return f"#compdef {parser.prog}\n_arguments \\\n  " + " \\\n  ".join([*lines, "'*:file:_files'"]) + "\n"
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What ends a program with one line, and its exit code."""
+"""Errors that end a program with one line, and their exit codes."""
 
 
 class ProgramError(Exception):
@@ -12,11 +12,11 @@ class InputError(ProgramError):
 
 
 class FileError(ProgramError):
-    """Unreadable, damaged, or a file of another kind."""
+    """The file is unreadable, damaged or of another kind."""
     exit_code = 4
 
 
 def shown(text, most=60):
-    """The beginning of a text of a file, printable."""
+    """The beginning of a text from a file, made printable."""
     text = text.encode("utf-8", "backslashreplace").decode("utf-8")
     return "".join(c if c.isprintable() else "?" for c in text[:most])

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What people read of the numbers that af-evaluate writes: a page, figures, tables."""
+"""A page, figures and tables for people, from the numbers that af-evaluate writes."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a page is made of; page.html knows how each is written. Texts are escaped unless they are Markup."""
+"""The parts of a page. page.html knows how each is written. Texts are escaped unless they are Markup."""
 import base64
 from dataclasses import dataclass, field
 
@@ -8,7 +8,7 @@ from markupsafe import Markup
 
 @dataclass
 class Table:
-    """A table that readers may sort by any column. A title that begins with '#' is of numbers, right-aligned."""
+    """A table that readers may sort by any column. A title that begins with '#' marks a column of numbers, aligned right."""
 
     titles: list
     rows: list

@@ -14,7 +14,7 @@ MOST_FAILURES = 60
 
 
 def spark(points, success_mm):
-    """TRE along a search as a small line; dashed: below which a start succeeds, unless one view hides that."""
+    """TRE along a search as a small line. A dashed line shows the limit of success, unless one view hides it."""
     width, height = 150, 40
     top, poses = max([2 * (success_mm or 0), *(tre for _, tre in points)]), max(1, points[-1][0])
     y = lambda tre: f"{height - 2 - (height - 4) * tre / top:.1f}"  # noqa: E731
@@ -40,18 +40,18 @@ def trace_cell(run, start, success_mm):
 
 
 def repeat_command(summary, start):
-    """What registers one start alone; empty for another program's poses."""
+    """The command that registers one start alone. Empty for another program's poses."""
     repeat = summary.get("repeat")
     if not repeat:
         return ""
-    # Ray casting beside fields has the blur of their levels, so it is repeated beside them.
+    # Ray casting beside fields is blurred like their levels, so it is repeated beside them.
     renderer = "both" if start["renderer"] == "raycast" and repeat["renderer"] == "both" else start["renderer"]
     return (f"{repeat['command']} --case {shlex.quote(start['case'])} --renderer {shlex.quote(renderer)} --only-start {start['start_index']} "
             f"--output {shlex.quote(repeat['output'] + '/' + start_name(start))}")
 
 
 def failures(run):
-    # The searches' TREs are no measure of success with one view.
+    # With one view the TREs of searches do not measure success.
     success_mm, rows, count = None if run.has_one_view else float(run.summary["success_tre_mm"]), [], 0
     for start in run.starts:
         if start["success"] == "1":

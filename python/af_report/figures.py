@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The figures of runs: each function returns a matplotlib figure and the columns and rows that it is drawn from."""
+"""The figures of runs: each function returns a matplotlib figure, and the columns and rows from which it is drawn."""
 import io
 import math
 import zlib
@@ -22,8 +22,8 @@ STYLE = {
 
 
 def new_figure(title="", size=None, rows=1, columns=1):
-    """Without a size: one panel with margins for numbers such as 0.01, which saves the layout's time."""
-    # The import takes longer than most pages, so that only what draws pays for it.
+    """A new figure. Without a size it has one panel with fixed margins, wide enough for 0.01, which saves the layout's time."""
+    # The import takes longer than most pages, so only figures pay for it.
     import matplotlib
     from matplotlib.figure import Figure
     matplotlib.rcParams.update(STYLE)
@@ -37,7 +37,7 @@ def new_figure(title="", size=None, rows=1, columns=1):
 
 
 def svg_of(figure):
-    """The bytes, by one drawing; savefig() draws twice."""
+    """The bytes, drawn only once; savefig() draws twice."""
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     buffer = io.BytesIO()
     FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None, "Creator": None})
@@ -57,7 +57,7 @@ def save(drawn, path):
     """PATH.svg, PATH.png at twice the size and, where there are rows, PATH.csv."""
     figure, columns, rows = drawn
     write_file(f"{path}.png", png_of(figure))
-    # The first drawing has laid the figure out.
+    # Drawing the PNG has laid the figure out already.
     figure.set_layout_engine("none")
     write_file(f"{path}.svg", svg_of(figure))
     if columns:
@@ -65,7 +65,7 @@ def save(drawn, path):
 
 
 def ticks_at(axis, values):
-    """These ticks alone, with their numbers as they stand."""
+    """Shows only these ticks, with their numbers as they stand."""
     from matplotlib.ticker import FixedLocator
     axis.set_major_locator(FixedLocator(values))
     axis.set_ticks([], minor=True)
@@ -89,7 +89,7 @@ def line_at(axes, value, text, horizontal=True):
 
 
 def success_rates(groups, error="TRE"):
-    """Of (label, intervals of a summary): success by an error per interval of initial TRE with Wilson intervals (Fig. 16)."""
+    """Success per interval of initial TRE with Wilson intervals (Fig. 16). `groups`: (label, intervals of a summary)."""
     figure, (axes,) = new_figure("Success against initial error")
     rows = []
     for place, (label, intervals) in enumerate(groups):
@@ -110,8 +110,8 @@ def success_rates(groups, error="TRE"):
 
 
 def tre_histogram(groups, success_mm, error="TRE"):
-    """Shares of each group's starts per error, eight bars per tenfold; the last holds all beyond, and ends without a
-    pose (Fig. 15)."""
+    """Share of each group's starts against their error, with eight bars per factor of ten. The last bar holds all larger
+    errors and the ends without a pose (Fig. 15)."""
     figure, (axes,) = new_figure("Error after registration")
     edges = [LOWEST_MM * 10 ** (step / 8) for step in range(33)]
     rows = []
@@ -128,7 +128,7 @@ def tre_histogram(groups, success_mm, error="TRE"):
         shares = [100 * count / max(1, len(starts)) for count in counts]
         left = [low * 10 ** (place / 8 / len(groups)) for low in edges]
         widths = [low * (10 ** (0.92 / 8 / len(groups)) - 1) for low in left]
-        # One outline instead of a patch per bar, which would take half the drawing's time.
+        # One outline, because a patch per bar would take half the drawing's time.
         axes.fill_between([x for low, width in zip(left, widths) for x in (low, low, low + width, low + width)],
                           [y for share in shares for y in (0, share, share, 0)], color=COLORS[place % 6], linewidth=0, label=label)
     axes.set_xscale("log")
@@ -143,7 +143,7 @@ def tre_histogram(groups, success_mm, error="TRE"):
 
 
 def in_part(groups):
-    """More dots would tell nothing more: every n-th start, and what a title says of it."""
+    """Every n-th start, as more dots would show nothing more, and the words for it in a title."""
     stride = max(1, math.ceil(max((len(starts) for _, starts in groups), default=0) / MOST_DOTS))
     return [(label, starts[::stride]) for label, starts in groups], "" if stride == 1 else f", one start in {stride}"
 
@@ -171,7 +171,7 @@ def tre_scatter(groups, largest_mm, success_mm, error="TRE"):
 
 
 def confidence(groups, success_mm, error="TRE"):
-    """Stated confidence against the error, 0 where there is no end."""
+    """Stated confidence against the error. The confidence is 0 where there is no end."""
     groups, part = in_part(groups)
     figure, (axes,) = new_figure("Stated confidence against the error" + part)
     rows, lowest = [], 1e-3
@@ -295,13 +295,13 @@ def field_parameters(run):
 
 
 def groups_of(run):
-    """(what a figure calls it, its starts) of each method."""
+    """(label in figures, starts) for each method."""
     renderers = [renderer["renderer"] for renderer in run.summary["renderers"]]
     return [(method_name(name), [start for start in run.starts if start["renderer"] == name]) for name in renderers]
 
 
 def figures_of(run):
-    """The figures of a run by name: functions without arguments."""
+    """The figures of a run by name, as functions without arguments."""
     summary = run.summary
     if run.kind == "registration":
         success_mm = float(summary["success_tre_mm"])

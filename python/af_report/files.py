@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reading tables with their lines, and writing files that appear only when whole."""
+"""Reads tables with their line numbers, and writes files that appear only when whole."""
 import csv
 import io
 import math
@@ -9,7 +9,7 @@ from af_programs.errors import FileError
 
 
 class Row(dict):
-    """A line of a CSV, which knows where it stands."""
+    """A line of a CSV that knows its file and line number."""
 
     where = ""
 
@@ -28,7 +28,7 @@ class Row(dict):
 
 
 def rows_of(path):
-    """The rows of a CSV one by one. FileError: no such file, a line that is cut off, no header."""
+    """The rows of a CSV one by one. Raises FileError for a missing file, a truncated line or no header."""
     try:
         with open(path, encoding="utf-8", newline="") as file:
             reader = csv.reader(file, strict=True)
@@ -56,7 +56,7 @@ def columns_of(path):
 
 
 def write_file(path, content):
-    """Text or bytes, under another name until they are whole."""
+    """Writes text or bytes, under another name until they are whole."""
     partial = f"{path}.partial"
     try:
         with open(partial, "wb") as file:

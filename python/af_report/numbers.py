@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Numbers as people read them: three significant digits, a dash for what is not known."""
+"""Numbers for people: three significant digits, and a dash for what is not known."""
 import math
 
 NO_BREAK = "\u00a0"
 
 
 def as_number(value):
-    """A float; NaN for null and for what is no number. summary.json writes an infinity as a text."""
+    """A float. NaN for null and for what is not a number. summary.json writes an infinity as a text."""
     if value == "inf":
         return math.inf
     return float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else math.nan
 
 
 def three(value):
-    """0.268, 12.3, 103, 1240; a dash for what is not known."""
+    """0.268, 12.3, 103 or 1240. A dash for what is not known."""
     value = as_number(value)
     if math.isnan(value):
         return "–"
@@ -27,13 +27,13 @@ def three(value):
 
 
 def whole(value):
-    """A count, or a number as it stands: 16, 2.5."""
+    """A count, or a number as it stands: 16 or 2.5."""
     value = as_number(value)
     return "–" if math.isnan(value) else f"{value:g}" if abs(value) < 1e6 else f"{value:.0f}"
 
 
 def percent(share):
-    """Three digits, which never round a failure or a success away."""
+    """Three digits. Rounding never hides a failure or a success."""
     value = 100 * as_number(share)
     if not math.isfinite(value):
         return "–"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the page says of fields, similarity curves and error budgets."""
+"""The page's sections on fields, similarity curves and error budgets."""
 import math
 
 from markupsafe import Markup
@@ -62,7 +62,7 @@ def nodes_text(field):
 
 
 def range_text(field):
-    """Two numbers, or the bounds of a box that these do not state."""
+    """Two numbers, or the bounds of a box that two numbers cannot state."""
     if str(field.get("range", "+-")).startswith("+-"):
         return f"±{three(field['max_rotation_deg'])}°, ±{three(field['max_translation_mm'])} mm"
     return field["range"]
@@ -76,7 +76,7 @@ def quality_table(runs):
                      whole(summary["compared"]), three(psnr["median"]), three(psnr["p5"]), three(psnr["min"]),
                      percent(summary["share_above_40_db"]), percent(summary["share_below_36_db"]),
                      time(summary["seconds_per_drr_field"]["median"]), time(summary["seconds_per_drr_raycast"]["median"])])
-    # Beside fields of another range or camera the paper's numbers would mislead.
+    # The paper's numbers would mislead beside fields of another range or camera.
     if all(map(is_papers_setting, runs)):
         rows.append(["Paper, 2005", "64×64, 256×256", "16384", "32", "±10°, ±100 mm", "100", "> 43", "", "", "almost all", "very few", "50 ms",
                      "1.5 s"])

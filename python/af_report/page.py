@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The page of all runs, which opens without a network."""
+"""The page with all runs. It opens without a network."""
 from pathlib import Path
 
 import jinja2
@@ -25,25 +25,25 @@ def default_title(runs):
     return f"Registration of {len(cases)} cases" if len(cases) > 4 else f"Registration of {', '.join(cases)}"
 
 
-def sections(of):
-    registrations = of["registration"]
+def sections(runs_of_kind):
+    registrations = runs_of_kind["registration"]
     for run in registrations:
         yield registration.section(run, "Registration accuracy" if len(registrations) == 1 else f"Registration: {run.name}")
     for kind, make in (("error-budget", other_kinds.error_budget), ("similarity-curves", other_kinds.similarity),
                        ("image-quality", other_kinds.image_quality), ("field-parameters", other_kinds.field_parameters),
                        ("registration", provenance.xrays)):
-        if of[kind]:
-            yield make(of[kind])
+        if runs_of_kind[kind]:
+            yield make(runs_of_kind[kind])
     yield Section("words", "What the words mean", [Terms(provenance.WORDS)])
 
 
 def page(runs, output, title):
-    """The page as text. FileError: a summary.json lacks something."""
+    """The page as text. Raises FileError if a summary.json lacks something."""
     for run in runs:
         run.page_folder = Path(output).resolve().parent
     try:
-        of = {kind: [run for run in runs if run.kind == kind] for kind in provenance.TITLES}
-        registrations, qualities = of["registration"], of["image-quality"]
+        runs_of_kind = {kind: [run for run in runs if run.kind == kind] for kind in provenance.TITLES}
+        registrations, qualities = runs_of_kind["registration"], runs_of_kind["image-quality"]
         findings = registration.findings(registrations[0]) if registrations else []
         if qualities:
             findings.append(other_kinds.quality_sentence(qualities))
@@ -56,6 +56,6 @@ def page(runs, output, title):
             tiles=registration.tiles(registrations[0]) if registrations else [],
             overview=registration.overview(registrations) if registrations else None,
             comparison=registration.comparison(registrations) if registrations else None, caution=provenance.caution(registrations),
-            sections=[*sections(of), provenance.provenance(runs)])
+            sections=[*sections(runs_of_kind), provenance.provenance(runs)])
     except (KeyError, IndexError, TypeError, AttributeError, ValueError, OverflowError, ZeroDivisionError) as error:
         raise FileError(f"summary.json or a table of a run lacks something, or holds something else than a number or a text: {error!r}") from error

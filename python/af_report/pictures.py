@@ -11,7 +11,7 @@ PICTURE_CAPTION = Markup("<b>Case %s, the %s result, view %s%s.</b> By %s, start
 
 
 def run_figure(run, name, alternative, caption, is_wide=False):
-    """The figure beside the run's numbers when it is of these numbers; else drawn anew."""
+    """The figure beside the run's numbers if it shows these numbers. Otherwise it is drawn anew."""
     svg, summary = run.folder / f"{name}.svg", run.folder / "summary.json"
     is_there = svg.is_file() and svg.stat().st_mtime >= summary.stat().st_mtime
     content = run.picture(f"{name}.svg") if is_there else svg_of(figures_of(run)[name]()[0])
@@ -24,7 +24,7 @@ def picture(run, name, alternative, caption, links=(), is_wide=False):
 
 
 def pictures(run):
-    """X-rays and regions, each case's best, median and worst end before and after, and whether a study fits together."""
+    """X-rays and regions, the best, median and worst end of each case before and after, and whether a study fits together."""
     shown, setting, facts = [], [], {}
     for entry in run.summary["pictures"]:
         which, case = entry["which"], entry["case"]
@@ -45,7 +45,7 @@ def pictures(run):
     blocks = []
     if shown:
         note = " Small bright bars are the steel fiducials, which the CT lacks." if run.summary.get("simulation") else ""
-        # Of each case first the X-rays, of each end first the outlines.
+        # The X-rays come first in each case, and the outlines first for each end.
         order = list(dict.fromkeys(case for case, *_ in shown)), ["", "best", "median", "worst"]
         shown.sort(key=lambda entry: (order[0].index(entry[0]), order[1].index(entry[1]), entry[2]))
         blocks += [heading("What it looks like"), Text(

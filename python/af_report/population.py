@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The figures of a study of many patients, of the tables that af-evaluate population writes."""
+"""The figures of a study of many patients, from the tables that af-evaluate population writes."""
 import re
 
 from .figures import BLUE, COLORS, SKY, VERMILION, new_figure
@@ -7,12 +7,12 @@ from .files import rows_of
 
 
 def is_drawn(condition):
-    """By the first renderer."""
+    """Conditions with several renderers are not drawn: their names end in ", RENDERER"."""
     return ", " not in condition
 
 
 def success(folder):
-    """Success against the initial error: a panel per variant and views, a line per preset."""
+    """Success against the initial error: a panel per variant and number of views, a line per preset."""
     panels = {}
     for row in rows_of(folder / "intervals.csv"):
         condition = row.text("condition")
@@ -57,7 +57,7 @@ def capture_ranges(folder):
         before = equals[condition, range_mm] = equals.get((condition, range_mm), -1) + 1
         number = re.search(r"(\d+)$", row.text("patient"))
         x, y = marks["odd" if number and int(number[1]) % 2 else "even"]
-        # Patients of equal range stand in columns of three, within the interval that ended the range.
+        # Patients of equal range are stacked in columns of three, within the interval that ended the range.
         x.append(range_mm + min(1.6, 0.3 * (before // 3)))
         y.append(-names.index(condition) + 0.12 * (before % 3))
     for half, color, label in (("odd", SKY, "odd patients"), ("even", BLUE, "even and real patients")):

@@ -14,13 +14,14 @@ MODULES = {"jinja2": "python3-jinja2", "matplotlib": "python3-matplotlib"}
 
 def parser():
     program = argparse.ArgumentParser(
-        prog="af-report", description="Makes what people read of the numbers that af-evaluate writes. With --output one page of all "
-        "finished runs in and below the folders; without it figures and tables beside their numbers.", allow_abbrev=False)
+        prog="af-report", description="Makes a page, figures and tables for people from the numbers that af-evaluate writes. With "
+        "--output it makes one page of all finished runs in and below the folders; without it figures and tables beside their "
+        "numbers.", allow_abbrev=False)
     program.add_argument("paths", metavar="PATH", nargs="+", help="Folders of results; without --output also tables (NAME.csv) of "
                          "af-evaluate compare and held-out, jobs/rate-against-truth.sh and bench-scaling")
     program.add_argument("-o", "--output", metavar="PATH", help="The page to write")
     program.add_argument("--title", metavar="TEXT", help="The page's title (default: made from the cases' names)")
-    program.add_argument("--screen", action="store_true", help="Of tables of compare: measures against optimisers instead of a row per run")
+    program.add_argument("--screen", action="store_true", help="For tables of compare: measures against optimisers instead of a row per run")
     add_common_options(program)
     return program
 
@@ -44,7 +45,7 @@ def write_table(text, path):
 
 
 def draw_table(path, is_screen):
-    """NAME.md, and figures, of a table that is known by its columns."""
+    """Writes NAME.md and figures for a table, which is recognised by its columns."""
     from . import studies, tables
     from .files import columns_of
     makers = {"rotation_share_0_8_mm": tables.comparison, "smoothed_psnr_db": tables.held_out, "mb_per_camera": studies.rates,
@@ -61,7 +62,7 @@ def draw_table(path, is_screen):
 
 
 def draw_folder(folder):
-    """Figures and tables of one folder, as far as its kind has some."""
+    """Writes the figures and tables of one folder, as far as its kind has some."""
     from . import figures, population, tables
     from .files import columns_of, rows_of
     from .runs import Run, is_papers_setting, read_summary
@@ -103,7 +104,7 @@ def main():
     options = parser().parse_args()
     if (options.title or options.screen) and bool(options.title) != bool(options.output):
         parser().error("--title needs --output, and --screen must not be given with it")
-    # Importing and drawing make many objects that stay: looking for garbage among them every 700 takes a tenth of the time.
+    # Importing and drawing make many objects that stay. Looking for garbage after every 700 takes a tenth of the time.
     gc.set_threshold(100_000)
     try:
         run(options)

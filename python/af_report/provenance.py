@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How X-rays were made, what words mean, and how every run can be repeated."""
+"""Sections on how X-rays were made, what words mean, and how every run can be repeated."""
 from markupsafe import Markup
 
 from .blocks import Items, Section, Terms, Text, heading, strong
@@ -81,7 +81,7 @@ def simulation_blocks(simulation):
 
 
 def xrays(runs):
-    """Runs of one study say the same: it is said once, with their names."""
+    """Runs of one study say the same, so it is said once, with their names."""
     found = []
     for run in runs:
         blocks = simulation_blocks(run.summary.get("simulation"))

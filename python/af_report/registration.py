@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the page says of registrations."""
+"""The page's section on registrations."""
 import math
 
 from markupsafe import Markup
@@ -15,7 +15,7 @@ MOST_CURVES = 6
 
 
 def method_text(run, renderer):
-    """attenuation fields, robust: ncc, gc, rg; the name alone for another program's poses."""
+    """attenuation fields, robust: ncc, gc, rg; only the name for another program's poses."""
     name, method = renderer["renderer"], run.summary["method"]
     if name not in ("field", "raycast"):
         return name
@@ -24,7 +24,7 @@ def method_text(run, renderer):
 
 
 def depth_text(depth):
-    """Median and 95th percentile of how far one view's depth is off; a dash where there is none."""
+    """Median and 95th percentile of one view's error in depth. A dash where there is none."""
     return f"{three(depth['median'])}, {three(depth['p95'])}" if depth["count"] else "–"
 
 
@@ -39,7 +39,7 @@ def confidence_text(renderer):
 
 
 def own_captures(renderer):
-    """Of the patients' own capture ranges the mean, the smallest and the largest, and intervals of the mean."""
+    """The mean, smallest and largest of the patients' own capture ranges, and intervals of the mean."""
     own = renderer["over_cases"]["capture_range_mm"]
     if own["cases"] < 2:
         return capture(renderer["capture_range"])
@@ -86,7 +86,7 @@ def tiles(run):
 
 
 def findings(run):
-    """How far the first method's starts may lie, and how long the others take."""
+    """How far off the first method's starts may be, and how long the others take."""
     first, paired = run.summary["renderers"][0], run.summary["field_against_raycast"]
     items = [f"Capture range with {method_name(first['renderer'])}: "
              f"{capture(first['capture_range'])}."]
@@ -335,7 +335,7 @@ def section(run, title):
 
 
 def comparison(runs):
-    """The first methods of several runs in one figure, where they divide initial TRE alike."""
+    """The first methods of several runs in one figure, if they divide initial TRE alike."""
     groups = [(run.name, run.summary["renderers"][0]["intervals"]) for run in runs]
     if len(runs) < 2 or any([entry["high_mm"] for entry in group] != [entry["high_mm"] for entry in groups[0][1]] for _, group in groups):
         return None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Finished runs of af-evaluate, as their folders tell."""
+"""Finished runs of af-evaluate, read from their folders."""
 import json
 import os
 import re
@@ -23,7 +23,7 @@ class Run:
         self.page_folder = folder
 
     def path(self, relative):
-        """A file of the run. FileError when that, or a link in it, leads out of the folder."""
+        """A file of the run. Raises FileError if its path, or a link in it, leads out of the folder."""
         path = (self.folder / str(relative)).resolve()
         if path == self.folder or self.folder not in path.parents:
             raise FileError(f"{self.folder / 'summary.json'}: names '{relative}', which is not a file of the run")
@@ -44,7 +44,7 @@ class Run:
 
     @cached_property
     def starts(self):
-        """What figures and lists need of registrations.csv."""
+        """The rows of registrations.csv, with what figures and lists need."""
         columns = ("initial_tre_mm", "tre_mm", "mrpd_mm", "confidence")
         one_view = {case["case"] for case in self.summary["cases"] if case["views"] == 1}
         starts = []
@@ -62,7 +62,7 @@ class Run:
 
     @property
     def error(self):
-        """By what its ends are counted: TRE, with one view mRPD, or both."""
+        """The error by which its ends are judged: TRE, mRPD with one view, or both."""
         return self.summary["renderers"][0]["error"]
 
     @property
@@ -79,7 +79,7 @@ def file_name_part(name):
 
 
 def method_name(renderer):
-    """Of a renderer's name, as summaries and tables have it."""
+    """The words for a renderer's name in summaries and tables."""
     return {"field": "attenuation fields", "raycast": "ray casting"}.get(renderer, renderer)
 
 
@@ -90,7 +90,7 @@ def read_summary(path):
         raise FileError(f"{path}: {error}") from None
     if not isinstance(summary, dict):
         raise FileError(f"{path}: is no JSON object")
-    # Other programs may leave a summary.json, too.
+    # Other programs may write a summary.json too.
     if summary.get("format") != FORMAT:
         return None
     if summary.get("format_version") != VERSION:
@@ -101,8 +101,8 @@ def read_summary(path):
 
 
 def find_runs(folders):
-    """The finished runs in the folders and below, each once; the default method first, then by path. Repeats of single
-    starts count only where their own folder is named."""
+    """The finished runs in the folders and below, each once, with the default method first and then by path. Repeats of
+    single starts count only if their own folder is named."""
     named, found = {Path(folder).resolve() for folder in folders}, set()
     for folder in map(Path, folders):
         if not folder.is_dir():
@@ -125,13 +125,13 @@ def find_runs(folders):
 def begins_with_default(run):
     try:
         return run.kind == "registration" and run.is_default(run.summary["renderers"][0])
-    except (KeyError, IndexError, TypeError, AttributeError):  # which the page will refuse
+    except (KeyError, IndexError, TypeError, AttributeError):  # the page will refuse it
         return False
 
 
 def set_names(runs):
-    """Paths below the deepest folder that all runs share. Where registrations end alike ("skull/registration",
-    "thorax/registration"), the common end is left out."""
+    """Names the runs by their paths below the deepest folder that all share. Registrations whose paths end alike
+    ("skull/registration", "thorax/registration") lose the common end."""
     shared = Path(os.path.commonpath([run.folder.parent for run in runs]))
     for run in runs:
         run.name = run.folder.relative_to(shared).as_posix()
@@ -151,7 +151,7 @@ def field_name(run):
 
 
 def is_papers_setting(run):
-    """Whether the paper's PSNR levels hold for the field: its motion range and camera."""
+    """Whether the field has the paper's motion range and camera, so that the paper's PSNR levels hold for it."""
     field = run.summary["field"]
     stated = [*field["detector_px"], *field["pixel_spacing_mm"], field["source_detector_mm"], field["max_rotation_deg"],
               field["max_translation_mm"]]

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures and tables of a job and a benchmark: jobs/rate-against-truth.sh and bench-scaling."""
+"""Figures and tables for jobs/rate-against-truth.sh and bench-scaling."""
 from .figures import BLUE, COLORS, GREEN, INK, PURPLE, QUIET, VERMILION, new_figure, save, ticks_at
 from .files import rows_of
 from .tables import markdown
 
 
 def scaling(path, _):
-    """Modelled seconds of af-precompute against ranks, per phase."""
+    """Draws the modelled seconds of af-precompute against ranks, per phase."""
     figure, (axes,) = new_figure("Modelled seconds of af-precompute", (8.6, 4.2))
     rows = list(rows_of(path))
     for field, column, color, style, label in (
@@ -25,7 +25,7 @@ def scaling(path, _):
 
 
 def panel(axes, rows, column, title):
-    """Designs whose names are budgets, such as 2MB, are joined; a square is paper, a diamond standard, a circle any other."""
+    """Joins designs whose names are budgets, such as 2MB. A square is paper, a diamond standard, a circle any other."""
     shown = sorted((row for row in rows if row.number(column) > 0), key=lambda row: row.number("mb_per_camera"))
     for place, anatomy in enumerate(sorted({row.text("anatomy") for row in rows})):
         color = COLORS[place % 6]
@@ -46,7 +46,7 @@ def kind_of(design):
 
 
 def rate_tables(rows):
-    """For each kind of X-rays a line per design, a column per anatomy."""
+    """Tables with a line per design and a column per anatomy, for each kind of X-rays."""
     text = ""
     for title, columns in (("MB per camera, dB, mm", ("mb_per_camera", "psnr_db", "median_distance_mm")),
                            ("ms of a DRR, of a registration by field, by ray casting", ("drr_ms", "registration_ms", "raycast_ms"))):
@@ -62,24 +62,24 @@ def rate_tables(rows):
 
 
 def rates(path, _):
-    """rate.svg (quality and times) and distance.svg (from ray casting's end) against the bytes of a field."""
+    """Draws rate.svg (quality and times) and distance.svg (from ray casting's end) against the bytes of a field."""
     rows = list(rows_of(path))
 
-    def of(variant, views):
+    def rows_with(variant, views):
         return [row for row in rows if row.text("variant") == variant and row.text("views") == views]
 
     figure, panels = new_figure("", (11, 7), 2, 2)
-    panel(panels[0], of("clean", "2"), "psnr_db", "PSNR, dB, clean")
-    panel(panels[1], of("clean", "2"), "drr_ms", "DRR, ms, clean")
+    panel(panels[0], rows_with("clean", "2"), "psnr_db", "PSNR, dB, clean")
+    panel(panels[1], rows_with("clean", "2"), "drr_ms", "DRR, ms, clean")
     for axes, variant in zip(panels[2:], ("clean", "stressed")):
-        panel(axes, of(variant, "2"), "registration_ms", f"registration, ms: {variant}, two views")
+        panel(axes, rows_with(variant, "2"), "registration_ms", f"registration, ms: {variant}, two views")
     for axes in panels[1:]:
         axes.set_yscale("log", base=2)
         axes.yaxis.set_major_formatter("{x:g}")
     save((figure, None, None), path.parent / "rate")
     figure, panels = new_figure("", (11, 7), 2, 2)
     for axes, (views, variant) in zip(panels, ((views, variant) for views in "21" for variant in ("clean", "stressed"))):
-        panel(axes, of(variant, views), "median_distance_mm", f"from ray casting's end, mm: {variant}, views: {views}")
+        panel(axes, rows_with(variant, views), "median_distance_mm", f"from ray casting's end, mm: {variant}, views: {views}")
         axes.set_yscale("log")
         axes.yaxis.set_major_formatter("{x:g}")
     save((figure, None, None), path.parent / "distance")

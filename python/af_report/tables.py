@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tables in Markdown of the tables that af-evaluate writes."""
+"""Markdown versions of the tables that af-evaluate writes."""
 import json
 import math
 from pathlib import Path
@@ -22,7 +22,7 @@ def markdown(titles, rows):
 
 
 def per_cent(share, decimals=None):
-    """Whole per cents must not round a failure away."""
+    """A share in per cent. Rounding to whole per cents must not hide a failure."""
     share = 100 * as_number(share)
     if not math.isfinite(share):
         return "-"
@@ -60,7 +60,7 @@ def methods_markdown(rows):
 
 
 def crossed(keys, cells):
-    """A table of (keys of a line, column, text)."""
+    """A table from cells (keys of a line, column, text)."""
     columns = sorted({column for _, column, _ in cells})
     lines = {}
     for line, column, text in cells:
@@ -69,14 +69,14 @@ def crossed(keys, cells):
 
 
 def screen_markdown(rows):
-    """Measures against optimisers: success of the first two bands and the median error."""
+    """Measures against optimisers, with the success of the first two bands and the median error."""
     return crossed(["Case", "Renderer", "Preset", "Measure"], [
         ((row.text("case"), row.text("renderer"), row.text("preset"), row.text("similarity")), row.text("optimizer"),
          f"{band_text(row, BANDS[0], False)} / {band_text(row, BANDS[1], False)}, {fixed(row.number('median_error_mm'), 3)}") for row in rows])[1]
 
 
 def studies_markdown(rows):
-    """A line per study, a column per method, where runs are named STUDY-PRESET...; nothing with fewer than two."""
+    """A line per study and a column per method, if runs are named STUDY-PRESET... Empty with fewer than two studies."""
     cells = []
     for row in rows:
         end = row.text("run").rfind("-" + row.text("preset")) if row.text("preset") else -1
@@ -184,7 +184,7 @@ def population_markdown(rows):
 
 
 def kinds_markdown(rows):
-    """A column per kind of patient, in the order in which they come."""
+    """A column per kind of patient, in the order of the rows."""
     kinds = list(dict.fromkeys(row.text("group") for row in rows if is_kind(row.text("group")) or row.text("group") == "real"))
     conditions = list(dict.fromkeys(row.text("condition") for row in rows))
     cells = {(row.text("condition"), row.text("group")): f"{per_cent(row.number('rate'), 1)}, {fixed(row.number('capture_mm'), 1)}" for row in rows}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What pickle calls to make objects again that are known by the arguments that made them."""
+"""Functions that pickle calls to remake objects from the arguments that first made them."""
 
 from typing import Any, Dict
 

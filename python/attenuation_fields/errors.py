@@ -3,7 +3,7 @@
 
 
 class Error(Exception):
-    """Base of all. `exit_code` is that of a program that meets the error."""
+    """Base of all. `exit_code` is the one with which a program ends on this error."""
 
     exit_code: int = 6
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files that the programs write, as arrays, and what takes one call."""
+"""Files that the programs write, as arrays, and tasks that take one call."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def _number(value: Any, path: str, key: str) -> float:
 
 
 def read_result(path: Path) -> Result:
-    """The result.json of af-register, or of its folder. FileError."""
+    """Reads a result.json of af-register, or the one in a folder. Raises FileError."""
     name = os.fspath(path)
     if os.path.isdir(name):
         name = os.path.join(name, "result.json")
@@ -108,12 +108,12 @@ def _columns(path: Path) -> Dict[str, Column]:
 
 
 def read_registrations(path: Path) -> Dict[str, Column]:
-    """The columns of a registrations.csv, in its order: float64, texts as str. FileError."""
+    """The columns of a registrations.csv, in its order: float64, texts as str. Raises FileError."""
     return _columns(path)
 
 
 def read_image_quality(path: Path) -> Dict[str, Column]:
-    """The columns of an image-quality.csv: float64. FileError."""
+    """The columns of an image-quality.csv: float64. Raises FileError."""
     return _columns(path)
 
 

@@ -19,7 +19,7 @@ from attenuation_fields.errors import InputError
 
 
 class DrrFunction(torch.autograd.Function):
-    """(n, 6) parameters (degrees, mm) to (n, h, w) DRRs."""
+    """Maps (n, 6) parameters (degrees, mm) to (n, h, w) DRRs."""
 
     @staticmethod
     def forward(ctx: Any, parameters: Tensor, renderer: Renderer) -> Tensor:
@@ -31,7 +31,7 @@ class DrrFunction(torch.autograd.Function):
         ctx.place = (parameters.device, parameters.dtype)
         return torch.from_numpy(drrs).to(parameters.device)
 
-    # The DRRs' second derivatives are not known: asking for them is an error.
+    # The DRRs' second derivatives are not known, so asking for them is an error.
     @staticmethod
     @once_differentiable  # type: ignore[misc]
     def backward(ctx: Any, grad_output: Tensor) -> Tuple[Tensor, None]:  # type: ignore[override]
@@ -43,7 +43,7 @@ class DrrFunction(torch.autograd.Function):
 
 
 def drr(renderer: Renderer, rotation_deg: Tensor, translation_mm: Tensor) -> Tensor:
-    """DRRs of rotations (..., 3) and translations (..., 3), as float32 (..., h, w)."""
+    """DRRs at rotations (..., 3) and translations (..., 3), as float32 (..., h, w)."""
     if rotation_deg.shape != translation_mm.shape or rotation_deg.shape[-1:] != (3,):
         raise InputError(
             f"rotation_deg, translation_mm: shapes = {tuple(rotation_deg.shape)}, "
@@ -71,7 +71,7 @@ class Drr(torch.nn.Module):
 def finite_differences(
     renderer: Renderer, parameters: np.ndarray, weights: np.ndarray, steps: np.ndarray
 ) -> np.ndarray:
-    """Central differences of sum(weights * drr) by six parameters: what gradients are checked by."""
+    """Central differences of sum(weights * drr) by six parameters, to check gradients."""
     both = np.concatenate([parameters + np.diag(steps), parameters - np.diag(steps)])
     sums = np.einsum("nhw,hw->n", renderer.drrs(both).astype(np.float64), weights)
     return (sums[:6] - sums[6:]) / (2.0 * steps)

@@ -27,8 +27,8 @@ std::string dtype_text(const py::array& array) {
   return py::str(array.dtype());
 }
 
-/// The n numbers of a list or a tuple of Python's own, the usual way of giving a few, without an
-/// array in between; none: of anything else.
+/// The n numbers of a Python list or tuple, which is the usual way to give a few numbers, without
+/// an array in between. None of any other object.
 template <std::size_t n>
 std::optional<std::array<double, n>> few_of(const py::object& given) {
   const bool is_list = PyList_CheckExact(given.ptr()) != 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Conversion between NumPy arrays and the library's types. Arrays of the required kind are not
+// Converts between NumPy arrays and the library's types. Arrays of the required kind are not
 // copied.
 #pragma once
 
@@ -17,20 +17,20 @@ namespace attenuation_fields::python {
 
 namespace py = pybind11;
 
-/// An argument that is to hold numbers: an array, a sequence, a tensor, ... It is taken whatever it
-/// is, so that errors are ours.
+/// An argument that must hold numbers: an array, a sequence, a tensor, ... Any object is accepted
+/// here, so that the errors are ours.
 struct Numbers {
   py::object given;
 };
 
-/// "(3,)", "(n, 6)": a shape as errors state it.
+/// A shape as errors state it: "(3,)", "(n, 6)".
 std::string shape_text(const py::array& array);
 
-/// InputError naming `name` unless the array has this shape; -1 is any extent.
+/// Throws InputError naming `name` unless the array has this shape. -1 is any extent.
 void require_shape(const py::array& array, const char* name, const std::vector<py::ssize_t>& shape);
 
-/// The argument as an array, not copied if it is one. InputError naming `name` unless it holds real
-/// numbers.
+/// The argument as an array, not copied if it is one. Throws InputError naming `name` unless it
+/// holds real numbers.
 py::array array_of_numbers(const Numbers& numbers, const char* name);
 
 /// The same with this shape, converted to float64 or float32 in C order.
@@ -38,18 +38,18 @@ template <typename Number>
 py::array_t<Number, py::array::c_style | py::array::forcecast> converted(
     const Numbers& numbers, const char* name, const std::vector<py::ssize_t>& shape);
 
-/// A new float32 array, or `out` itself: InputError unless that is float32, C-contiguous, aligned,
-/// writeable and of this shape.
+/// A new float32 array, or `out` itself. Throws InputError unless that is float32, C-contiguous,
+/// aligned, writeable and of this shape.
 py::array_t<float> output_array(const std::vector<py::ssize_t>& shape,
                                 const py::object& out,
                                 const char* name);
 
 std::span<float> floats_of(py::array_t<float>& array);
 
-/// InputError naming both when two outputs share memory.
+/// Throws InputError naming both when two outputs share memory.
 void require_apart(std::span<const float> first, std::span<const float> second, const char* names);
 
-/// InputErrors of these name `name`.
+/// The numbers of a short list. Throws InputError naming `name`.
 std::array<double, 2> pair_of(const Numbers& values, const char* name);
 std::array<int, 2> whole_pair_of(const Numbers& values, const char* name);
 Vector3 vector_of(const Numbers& values, const char* name);

@@ -21,7 +21,7 @@ using namespace pybind11::literals;
 
 using Voxels = py::array_t<std::int16_t, py::array::c_style>;
 
-/// Keeps an array; the last thread that lets go of it takes the interpreter's lock first.
+/// Keeps an array. The last thread that lets go of it takes the interpreter's lock first.
 std::shared_ptr<const void> kept(const py::array& array) {
   return {new py::object(array), [](void* pointer) {
             with_lock([](void* object) { delete static_cast<py::object*>(object); }, pointer);
@@ -37,7 +37,7 @@ std::int16_t exact_hu(double value, py::ssize_t k, py::ssize_t j, py::ssize_t i)
   return static_cast<std::int16_t>(value);
 }
 
-/// An aligned int16 array in C order is taken as it is. Another one is converted slice by slice.
+/// An aligned int16 array in C order is used as it is. Any other is converted slice by slice.
 Voxels voxels_of_array(const Numbers& hu) {
   const py::array array = array_of_numbers(hu, "hu");
   require_shape(array, "hu", {-1, -1, -1});
@@ -79,7 +79,7 @@ Ct ct_read(const std::filesystem::path& path, const std::string& series_uid) {
   return ct;
 }
 
-/// The voxels themselves, read-only; the array keeps the CT.
+/// The voxels themselves, read-only. The array keeps the CT alive.
 py::array_t<std::int16_t> voxels_of(const Ct& ct) {
   const py::capsule owner(new Ct(ct), [](void* pointer) { delete static_cast<Ct*>(pointer); });
   const auto& size = ct.grid().size;
@@ -102,14 +102,14 @@ void bind_ct(py::module_& module) {
       "origin_mm"_a = std::array<double, 3>{},
       "direction"_a =
           std::array<std::array<double, 3>, 3>{{{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}}},
-      "A CT of an array (k, j, i) of whole HU, int16 or exact as int16. An int16 array in C order "
-      "is not copied: it must not change afterwards, because attenuation and hash are kept. "
-      "spacing_mm and origin_mm are (x, y, z), the columns of direction those of i, j, k.");
+      "A CT from an array (k, j, i) of whole HU, int16 or exact as int16. An int16 array in C "
+      "order is not copied and must not change afterwards, because attenuation and hash are kept. "
+      "spacing_mm and origin_mm are (x, y, z). The columns of direction belong to i, j, k.");
   ct.def_static("read",
                 &ct_read,
                 "path"_a,
                 "series_uid"_a = "",
-                "A DICOM folder, NIfTI, MetaImage or NRRD file.");
+                "Reads a DICOM folder, or a NIfTI, MetaImage or NRRD file.");
   ct.def_property_readonly("hu", &voxels_of, "HU as int16 (k, j, i), read-only, not a copy.");
   ct.def_property_readonly(
       "size", [](const Ct& self) { return self.grid().size; }, "(i, j, k)");
@@ -122,10 +122,10 @@ void bind_ct(py::module_& module) {
   ct.def_property_readonly("direction", [](const Ct& self) {
     return py::array_t<double>({3, 3}, self.grid().direction.data());
   });
-  ct.def_property_readonly("content_sha256",
-                           &Ct::content_sha256,
-                           "Of size and voxels, not of where they lie: Field.is_of(ct) compares "
-                           "that, too.");
+  ct.def_property_readonly(
+      "content_sha256",
+      &Ct::content_sha256,
+      "Hash of size and voxels, but not of their place, which Field.is_of(ct) compares too.");
   ct.def(py::pickle(
       [](const Ct& self) {
         const CtGrid& grid = self.grid();

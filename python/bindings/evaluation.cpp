@@ -68,7 +68,7 @@ void bind_table(py::module_& module) {
         return cells_of(self.texts(column));
       },
       "column"_a,
-      "A column as a list of texts; bytes that are not UTF-8 as os.fsdecode() has them.");
+      "A column as a list of texts. Bytes that are not UTF-8 become what os.fsdecode() gives.");
   table.def(
       "numbers",
       [](const PythonTable& self, const std::string& column) {
@@ -76,7 +76,7 @@ void bind_table(py::module_& module) {
         return py::array_t<double>(static_cast<py::ssize_t>(numbers.size()), numbers.data());
       },
       "column"_a,
-      "A column as float64; empty cells are NaN.");
+      "A column as float64. Empty cells are NaN.");
 }
 
 }  // namespace
@@ -90,13 +90,12 @@ void bind_evaluation(py::module_& module) {
       "gold"_a,
       "target_box_ct_mm"_a,
       "Mean distance (mm) over a box ((low), (high)) between where two 4x4 poses put its points.");
-  module.def(
-      "psnr_db",
-      &psnr_db_of,
-      "drr"_a,
-      "reference"_a,
-      "Peak signal-to-noise ratio; zeros of the reference are left out; None when nothing is "
-      "left.");
+  module.def("psnr_db",
+             &psnr_db_of,
+             "drr"_a,
+             "reference"_a,
+             "Peak signal-to-noise ratio (dB). Pixels where the reference is 0 are left out. None "
+             "when nothing remains.");
   py::class_<SuccessRate> rate(
       module, "SuccessRate", "Successes and Wilson's 95 % interval of their rate.");
   rate.def_readonly("trials", &SuccessRate::trials);
@@ -114,7 +113,7 @@ void bind_evaluation(py::module_& module) {
              &success_rate_of,
              "tre_mm"_a,
              "threshold_mm"_a = kSuccessTreMm,
-             "Share of TREs (mm) below a threshold; NaN is a failure.");
+             "Share of TREs (mm) below a threshold. NaN is a failure.");
 }
 
 }  // namespace attenuation_fields::python

@@ -15,7 +15,7 @@ namespace {
 
 using namespace pybind11::literals;
 
-/// A camera or a rig that has no problems: InputError.
+/// Throws InputError unless the camera or rig is without problems.
 template <typename Owner>
 Owner sound(Owner owner) {
   owner.require_sound();
@@ -41,8 +41,8 @@ void bind_vector(py::class_<Owner>& owner, const char* name, Vector3 Owner::*mem
       });
 }
 
-/// An axis of the detector. Both are set one after the other, so that they are orthogonal is
-/// checked where the camera is used.
+/// An axis of the detector. Axes are set one after the other, so their orthogonality is checked
+/// only where the camera is used.
 void bind_axis(py::class_<Camera>& camera, const char* name, Vector3 Camera::*member) {
   camera.def_property(
       name,
@@ -165,7 +165,7 @@ void bind_rig(py::module_& module) {
         return rig_read;
       },
       "name_or_path"_a,
-      "A rig file, or a shipped rig: 'c-arm-12in', 'treatment-room'.");
+      "Reads a rig file, or a shipped rig: 'c-arm-12in', 'treatment-room'.");
   bind_vector(rig, "isocenter_point", &Rig::isocenter_point);
   rig.def_property_readonly("cameras", [](const Rig& self) { return self.cameras; });
   rig.def(
@@ -180,7 +180,7 @@ void bind_frame(py::module_& module) {
   py::class_<PoseFrame> frame(
       module,
       "PoseFrame",
-      "What pose parameters are relative to: x_room = r + t + Rz Ry Rx R0 (x_ct - c).");
+      "The origin of pose parameters: R0, c and r in x_room = r + t + Rz Ry Rx R0 (x_ct - c).");
   frame.def_static(
       "about",
       [](const Numbers& nominal, const Numbers& center_ct_mm) {
@@ -226,7 +226,7 @@ void bind_geometry(py::module_& module) {
       "read_pose",
       [](const std::filesystem::path& path) { return matrix_of(read_pose(path)); },
       "path"_a,
-      "room_from_ct (4x4) of a TOML, JSON, .tfm or text file.");
+      "room_from_ct (4x4) from a TOML, JSON, .tfm or text file.");
 }
 
 }  // namespace attenuation_fields::python

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What pickle and copy need: values by their members, what was opened or loaded by its arguments.
+// What pickle and copy need. Values are pickled by their members, and opened or loaded objects by
+// their arguments.
 #pragma once
 
 #include <algorithm>
@@ -36,7 +37,7 @@ Value unpickled(const py::handle& state) {
     return state.cast<Value>();
 }
 
-/// pickle before protocol 2 would make an object of pybind11's base, which ends the process.
+/// Before protocol 2, pickle would make an object of pybind11's base, which ends the process.
 template <typename Class>
 void def_protocols(Class& owner) {
   owner.def("__reduce_ex__", [](const py::object& self, int protocol) {
@@ -60,7 +61,7 @@ void def_pickle(py::class_<Value>& owner, Members Value::*... members) {
   def_protocols(owner);
 }
 
-/// A `Base` with the named arguments of what made it.
+/// A `Base` with the named arguments from which it was made.
 template <typename Base>
 struct MadeBy : Base {
   py::dict arguments;
@@ -98,7 +99,7 @@ auto keeping_arguments(Made (*make)(Arguments...),
   };
 }
 
-/// Copies of what does not change are the object itself.
+/// Copies of objects that do not change are the object itself.
 template <typename Class>
 void def_copies(Class& owner) {
   owner.def("__copy__", [](const py::object& self) { return self; });

@@ -25,7 +25,7 @@ void bind_result(py::module_& module) {
   view.def_readonly("fine", &ViewAgreement::fine);
   def_pickle(view, &ViewAgreement::camera, &ViewAgreement::coarse, &ViewAgreement::fine);
   py::class_<Uncertainty> uncertainty(
-      module, "Uncertainty", "What a registration says of its own error.");
+      module, "Uncertainty", "What a registration says about its own error.");
   uncertainty.def_property_readonly(
       "covariance",
       [](const Uncertainty& self) {
@@ -36,12 +36,12 @@ void bind_result(py::module_& module) {
                 self.covariance[static_cast<std::size_t>(row)][static_cast<std::size_t>(column)];
         return matrix;
       },
-      "Of (rx, ry, rz, tx, ty, tz) (6x6), degrees and mm: motions after the end, about the centre "
-      "of the region of interest, along the room's axes.");
+      "Covariance (6x6) of (rx, ry, rz, tx, ty, tz), in degrees and mm. These are motions after "
+      "the end, about the centre of the region of interest and along the room's axes.");
   uncertainty.def_readonly("tre_rms_mm",
                            &Uncertainty::tre_rms_mm,
-                           "Expected over the target box. TREs are calibrated by themselves: by "
-                           "the covariance they would be larger.");
+                           "Expected over the target box. TREs have a calibration of their own; "
+                           "the covariance would give larger ones.");
   uncertainty.def_readonly(
       "tre_95_mm", &Uncertainty::tre_95_mm, "The TRE stays below with a probability of 0.95.");
   uncertainty.def_readonly(
@@ -51,7 +51,7 @@ void bind_result(py::module_& module) {
              &Uncertainty::tre_rms_mm,
              &Uncertainty::tre_95_mm,
              &Uncertainty::confidence);
-  py::class_<Registration> result(module, "Registration", "Where a registration led.");
+  py::class_<Registration> result(module, "Registration", "The result of a registration.");
   result.def_readonly("start_index", &Registration::start_index);
   result.def_property_readonly("start",
                                [](const Registration& self) { return matrix_of(self.start); });
@@ -102,7 +102,7 @@ void bind_result(py::module_& module) {
              &Registration::seconds);
 }
 
-/// The pixels themselves, read-only; the array keeps their owner.
+/// The pixels themselves, read-only. The array keeps their owner alive.
 py::array_t<float> image_of(const CaseView& view, std::span<const float> pixels) {
   using Owner = std::shared_ptr<const void>;
   const py::capsule keeper(new Owner(view.owner),
@@ -130,7 +130,7 @@ std::vector<PythonView> views_of(const PythonCase& owner) {
   return views;
 }
 
-/// Rows and columns of a camera's X-ray; any for a camera that the case does not have.
+/// Rows and columns of a camera's X-ray. Any for a camera that the case does not have.
 std::vector<py::ssize_t> shape_of(const PythonCase& owner, const std::string& camera) {
   for (const CaseView& view : owner.views())
     if (view.camera.name == camera) return {view.camera.size_px[1], view.camera.size_px[0]};
@@ -262,9 +262,9 @@ void bind_case(py::module_& module) {
                                "tube_kvp"_a = Beam{}.tube_kvp,
                                "aluminium_mm"_a = Beam{}.aluminium_mm,
                                "scatter_to_primary"_a = Beam{}.scatter_to_primary,
-                               "As af-register, but casts rays only if renderer says so. fields: a "
-                               "path or an open Field by camera; cases share an open Field, which "
-                               "is neither read nor decoded again.");
+                               "Loads a case as af-register does, but casts rays only if renderer "
+                               "says so. fields: a path or an open Field for each camera. Cases "
+                               "share an open Field, which is neither read nor decoded again.");
   def_made_again(registration_case, "registration_case");
   registration_case.def(
       "set_xrays",
@@ -282,7 +282,7 @@ void bind_case(py::module_& module) {
       },
       "camera"_a,
       "xray"_a,
-      "set_xrays() of one camera.");
+      "set_xrays() for one camera.");
   registration_case.def_property_readonly("name", &RegistrationCase::name);
   registration_case.def_property_readonly(
       "views",
@@ -297,7 +297,7 @@ void bind_case(py::module_& module) {
         if (!gold.has_value()) return py::none();
         return matrix_of(*gold);
       },
-      "The pose that errors are measured against, or None.");
+      "The pose against which errors are measured, or None.");
   registration_case.def(
       "landmark_start",
       [](const PythonCase& self) -> py::object {
@@ -311,7 +311,7 @@ void bind_case(py::module_& module) {
       [](const PythonCase& self) {
         return matrix_of(without_lock([&] { return self.usual_start(); }));
       },
-      "Where af-register starts unless told: at landmark_start(), else at the nominal pose.");
+      "Where af-register starts by default: landmark_start(), or else the nominal pose.");
   registration_case.def(
       "tre_mm",
       [](const PythonCase& self, const Numbers& pose) {
@@ -337,8 +337,8 @@ void bind_case(py::module_& module) {
         return without_lock([&] { return self.run_all(poses); });
       },
       "starts"_a,
-      "Registers from many starts (n, 4, 4); the X-rays of the best end are not looked into, as "
-      "run() does.");
+      "Registers from many starts (n, 4, 4). Unlike run(), it does not look into X-rays that do "
+      "not fit.");
   registration_case.def(
       "similarity",
       [](const PythonCase& self, const Numbers& pose) {
@@ -346,7 +346,8 @@ void bind_case(py::module_& module) {
         return without_lock([&] { return self.similarity(room_from_ct); });
       },
       "pose"_a,
-      "What results are compared by, at a 4x4 pose; None where it is inadmissible.");
+      "The similarity by which results are compared, at a 4x4 pose. None where the pose is "
+      "inadmissible.");
 }
 
 }  // namespace

@@ -23,7 +23,7 @@ std::vector<py::ssize_t> shape_of(const Renderer& renderer,
   return shape;
 }
 
-/// A pose given as a matrix, or by rotations and translations.
+/// A pose that is given as a matrix, or by rotations and translations.
 Pose pose_of(const Renderer& renderer,
              const Numbers& rotation,
              const Numbers& translation,
@@ -125,8 +125,8 @@ void bind_renderer(py::module_& module) {
   py::class_<Renderer> renderer(
       module,
       "Renderer",
-      "What makes DRRs of one CT for one camera: a Field or a RayCaster. Values are line integrals "
-      "of the attenuation, float32, and those of af-drr to the bit.");
+      "Makes DRRs of one CT for one camera: a Field or a RayCaster. Values are line integrals of "
+      "the attenuation, float32, and those of af-drr to the bit.");
   renderer.def_property_readonly("camera", [](const Renderer& self) { return self.camera(); });
   renderer.def_property_readonly("frame", [](const Renderer& self) { return self.frame(); });
   renderer.def_property_readonly(
@@ -140,7 +140,7 @@ void bind_renderer(py::module_& module) {
                "pose"_a = py::none(),
                "out"_a = py::none(),
                "The DRR at a pose: rotations about the room's axes and translations along them "
-               "relative to frame, or a 4x4 room_from_ct. `out` receives it where it is given.");
+               "relative to frame, or a 4x4 room_from_ct. `out` receives it if given.");
   renderer.def("drr_and_gradient",
                &drr_and_gradient,
                "rotation_deg"_a = Vector3{},
@@ -150,24 +150,25 @@ void bind_renderer(py::module_& module) {
                "gradient_out"_a = py::none(),
                "The DRR and its derivatives (6, h, w) by rx, ry, rz per degree and tx, ty, tz per "
                "mm.");
-  renderer.def("drr_and_motion_gradient",
-               &drr_and_motion_gradient,
-               "pose"_a,
-               "pivot_room_mm"_a,
-               "The DRR and its derivatives (6, h, w) by small motions after a 4x4 pose: rotations "
-               "about the room's axes through a pivot per rad, translations per mm.");
+  renderer.def(
+      "drr_and_motion_gradient",
+      &drr_and_motion_gradient,
+      "pose"_a,
+      "pivot_room_mm"_a,
+      "The DRR and its derivatives (6, h, w) with respect to small motions after a 4x4 pose: "
+      "rotations about the room's axes through a pivot per rad, translations per mm.");
   renderer.def("drrs",
                &drrs,
                "parameters"_a = py::none(),
                py::kw_only(),
                "poses"_a = py::none(),
                "out"_a = py::none(),
-               "DRRs (n, h, w) of many poses: parameters (n, 6) as in registrations.csv, or "
+               "DRRs (n, h, w) at many poses: parameters (n, 6) as in registrations.csv, or "
                "matrices (n, 4, 4). The renderer's threads share them.");
   renderer.def("drrs_and_gradients",
                &drrs_and_gradients,
                "parameters"_a,
-               "DRRs (n, h, w) and their derivatives (n, 6, h, w) of parameters (n, 6).");
+               "DRRs (n, h, w) and their derivatives (n, 6, h, w) at parameters (n, 6).");
 }
 
 Outside outside_of(const std::string& name) {
@@ -217,7 +218,8 @@ void bind_field(py::module_& module) {
       "--look-up` (default: the "
       "field's own); threads: 0 is every processor; outside: 'raise' or 'zero' where rays miss the "
       "field; tube_kvp: DRRs of a tube's spectrum, with the field of the CT's bone beside it.");
-  field.def_property_readonly("members", &Field::members, "Fields of an atlas; 1 for a field.");
+  field.def_property_readonly(
+      "members", &Field::members, "How many fields an atlas has; 1 for a field.");
   field.def_property_readonly("look_up", &Field::look_up);
   field.def_property_readonly("max_rotation_deg", &Field::max_rotation_deg);
   field.def_property_readonly("max_translation_mm", &Field::max_translation_mm);
@@ -281,7 +283,8 @@ void bind_ray_caster(py::module_& module) {
              "tube_kvp"_a = Beam{}.tube_kvp,
              "aluminium_mm"_a = Beam{}.aluminium_mm,
              "scatter_to_primary"_a = Beam{}.scatter_to_primary,
-             "frame: what poses are relative to; without one the CT's centre at isocenter_point.");
+             "frame: the origin of pose parameters; without one it is the CT's centre at "
+             "isocenter_point.");
   def_made_again(caster, "ray_caster");
   def_copies(caster);
 }

@@ -17,7 +17,7 @@ py::str message_of(std::string_view text);
 /// As os.fsdecode() has it: text.encode("utf-8", "surrogateescape") gives all bytes back.
 py::str cell_of(std::string_view bytes);
 
-/// Each as a UserWarning; py::error_already_set where warnings are errors.
+/// Gives each as a UserWarning. Throws py::error_already_set where warnings are errors.
 void warn_of(const std::vector<std::string>& texts);
 
 }  // namespace attenuation_fields::python

@@ -10,7 +10,7 @@
 namespace attenuation_fields::python {
 namespace {
 
-std::atomic<int> calls = 0;  ///< of the library, in all threads
+std::atomic<int> calls = 0;  ///< of the library, counted over all threads
 
 bool is_ending() {
 #if PY_VERSION_HEX >= 0x030D0000

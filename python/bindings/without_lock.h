@@ -14,30 +14,30 @@ namespace attenuation_fields::python {
 
 namespace py = pybind11;
 
-/// The interpreter's lock given up, for a call of the library. When the interpreter ends, threads
-/// other than the last never get it back: CPython unwinds them, which C++ does not survive, so they
-/// sleep in take() until the process is over.
+/// Gives up the interpreter's lock for a call of the library. When the interpreter ends, only the
+/// last thread gets it back. CPython unwinds the others, which C++ does not survive, so they sleep
+/// in take() until the process is over.
 class GivenUpLock {
  public:
   GivenUpLock();
   void take();
   /// Whether one of Python's signal handlers, which run in here, has raised something, or the
-  /// interpreter ends.
+  /// interpreter is ending.
   bool has_raised();
 
  private:
   PyThreadState* state_;
 };
 
-/// Before the process destroys its static objects, it waits for calls of other threads to end.
+/// Before the process destroys its static objects, waits for calls in other threads to end.
 void await_calls_at_the_end();
 
-/// Runs `work` with the lock, on a thread that may have it already or be none of Python's; not at
-/// all when the interpreter is gone.
+/// Runs `work` with the lock, on a thread that may have it already or may not belong to Python.
+/// Does nothing when the interpreter is gone.
 void with_lock(void (*work)(void* context), void* context);
 
-/// Runs `compute` without the lock, and gives its result. What a signal handler raises, such as
-/// KeyboardInterrupt, ends the computation and leaves as py::error_already_set.
+/// Runs `compute` without the lock, and returns its result. An exception from a signal handler,
+/// such as KeyboardInterrupt, ends the computation and leaves as py::error_already_set.
 template <typename Compute>
 std::invoke_result_t<Compute> without_lock(const Compute& compute) {
   GivenUpLock lock;

@@ -47,7 +47,7 @@ print(f"PSNR {np.median(psnr_db):.1f} dB (median of {len(psnr_db)}), lowest {psn
 print(f"looking up took {1000 * (middle - start) / 20:.2f} ms each, casting {1000 * (end - middle) / 20:.1f} ms")
 
 # %% [markdown]
-# Its derivatives: how the image changes per degree and per mm.
+# The derivatives say how the image changes per degree and per mm.
 
 # %%
 drr, gradient = field.drr_and_gradient(parameters[0, :3], parameters[0, 3:])

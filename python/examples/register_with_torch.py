@@ -57,7 +57,7 @@ def correlation(image, xray):
 
 
 # %% [markdown]
-# Adam on the sum of the views' correlations. A degree moves the projection of a CT's rim about as
+# Adam maximises the sum of the views' correlations. A degree moves the projection of a CT's rim about as
 # far as two mm, so rotations get half the step.
 
 # %%
@@ -90,7 +90,7 @@ if case.gold is not None:
     print(f"TRE {case.tre_mm(start):.2f} mm at the start, {case.tre_mm(pose):.2f} mm at the end")
 
 # %% [markdown]
-# The same by this project's own method, which needs no step sizes and gives a verdict.
+# The same task for this project's own method, which needs no step sizes and gives a verdict.
 
 # %%
 found = case.run(start)

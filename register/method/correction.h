@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Corrected finish: registration by look-up ends at a pose slightly off ray casting's, because the
+// Corrected finish. Registration by look-up ends at a pose slightly off ray casting's, because the
 // field interpolates and quantises. From there the last stage converges by ray casting.
 #pragma once
 
@@ -12,27 +12,27 @@
 namespace af::registration {
 
 /// What a correction did. Distances are NaN when the end was left as it was: nothing was cast, or
-/// the pose that casting found was discarded, because it is not admissible or has no value.
+/// the pose that casting found was discarded, because it is inadmissible or has no value.
 struct CorrectionReport {
   static constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
-  int casts =
-      0;  ///< DRRs per view; 0: the search before had not converged, or no evaluation was left
-  double moved_mm = kNone;   ///< end from the end of look-up, mean over the target box
-  double last_mm = kNone;    ///< likewise, by the last step alone
-  bool stood_still = false;  ///< the last step was within the tolerance, or the search's final step
+  int casts = 0;  ///< DRRs per view; 0: the search had not converged, or no evaluation was left
+  double moved_mm = kNone;  ///< from the end of look-up to the end, mean over the target box
+  double last_mm = kNone;   ///< likewise, by the last step alone
+  bool stood_still =
+      false;  ///< the last step was within the tolerance, or within the search's final step
 
   auto members() { return std::tie(casts, moved_mm, last_mm, stood_still); }
 };
 
 struct CorrectionOptions {
   bool is_wanted = false;
-  /// The correction stops after a step no longer than this, mean over the target box.
+  /// The correction stops after a step no longer than this, averaged over the target box.
   double tolerance_mm = 0.005;
   int max_casts = 50;    ///< ray-cast DRRs per view
   double step_mm = 0.5;  ///< longest step of its ray casting
 
-  /// The step of ray casting where `wanted_mm` is asked for: shorter where a correction needs it.
+  /// The step of ray casting where `wanted_mm` is asked for. A correction may need a shorter one.
   [[nodiscard]] double cast_step_mm(double wanted_mm) const {
     return is_wanted ? std::min(wanted_mm, step_mm) : wanted_mm;
   }

@@ -21,7 +21,7 @@ ChainOptions unconditional_chain(const std::string& name, const std::string& tex
   return chain;
 }
 
-/// The chains that were typed, in place of the preset's.
+/// Replaces the preset's chains by those that were typed.
 void replace_chains(const MethodOptions& options, RegistrationOptions& result) {
   if (!options.chains.empty()) {
     result.chains.clear();

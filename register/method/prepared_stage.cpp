@@ -15,8 +15,8 @@
 namespace af::registration {
 namespace {
 
-/// Means over blocks of step x step pixels: of the blocks of `part`, the first one's corner at
-/// (first.x, first.y).
+/// Means over blocks of step x step pixels, for the blocks of `part`. The first block has its
+/// corner at (first.x, first.y).
 Image2d block_means(const Image2d& image,
                     int step,
                     const Eigen::Vector2i& first,
@@ -41,7 +41,7 @@ Image2d block_means(const Image2d& image,
   return blocks;
 }
 
-/// Whether all pixels of each block of a region, which whole blocks fill, are used.
+/// Whether all pixels of each block are used, in a region that whole blocks fill.
 std::vector<std::uint8_t> used_blocks(const Image2d& mask,
                                       int step,
                                       const RegionOfInterest& region) {
@@ -60,7 +60,7 @@ struct Extent {
   int count;
 };
 
-/// The middle of an extent that a whole number of stage pixels fills.
+/// The middle of an extent, filled by a whole number of stage pixels.
 Extent whole_pixels(const Extent& extent, int step, int limit) {
   const int whole = std::max(1, extent.count / step) * step;
   if (whole > limit)
@@ -68,7 +68,7 @@ Extent whole_pixels(const Extent& extent, int step, int limit) {
                      std::to_string(limit),
                      "the detector must hold a pixel of this stage, " + std::to_string(whole) +
                          " detector pixels wide (pixel_step)");
-  // A region narrower than a stage pixel, at the detector's edge, moves inwards.
+  // A region narrower than a stage pixel moves inwards at the detector's edge.
   const int spare = extent.count - whole;
   return {std::min(extent.first + std::max(0, spare) / 2, limit - whole), whole};
 }
@@ -81,7 +81,7 @@ RegionOfInterest scaled_region(const View& view, const StageGrid& grid) {
   return {columns.first, rows.first, columns.count, rows.count};
 }
 
-/// The region grown by half its size to every side, cut at the detector's edges.
+/// The region grown by half its size to every side, and cut at the detector's edges.
 RegionOfInterest grown(const RegionOfInterest& roi, const Eigen::Vector2i& size_px) {
   const int left = std::max(0, roi.column - roi.width / 2);
   const int top = std::max(0, roi.row - roi.height / 2);
@@ -108,15 +108,15 @@ std::shared_ptr<const DrrRenderer> stage_renderer(const RegistrationView& view, 
                     : view.coarse_levels[static_cast<std::size_t>(level) - 1].renderer;
 }
 
-/// Of a pose at which a stage cannot be placed.
+/// The value of a pose at which a stage cannot be placed.
 constexpr ObjectiveValue kNoValue{.similarity = std::numeric_limits<double>::quiet_NaN()};
 
 /// Markers are hidden only in stages of at least this many pixels, and if three quarters stay
-/// visible: in a small region nearly all coarse pixels may touch a marker.
+/// visible. In a small region nearly all coarse pixels may touch a marker.
 constexpr std::size_t kLeastPixelsToHideIn = 400;
 
-/// The X-ray with the markers hidden (`visible`: stage pixels without markers; empty: no markers),
-/// if that leaves enough of it.
+/// The X-ray with the markers hidden, if that leaves enough of it. `visible`: stage pixels without
+/// markers; empty: no markers.
 SimilarityReference without_markers(SimilarityReference reference,
                                     std::vector<std::uint8_t> visible) {
   const auto used = static_cast<std::size_t>(std::count(visible.begin(), visible.end(), 1));
@@ -125,7 +125,7 @@ SimilarityReference without_markers(SimilarityReference reference,
   return reference;
 }
 
-/// A region's part of values of a whole image; empty when they are.
+/// The part of an image's values that lies in a region. Empty when the values are.
 std::vector<std::uint8_t> part_of(const std::vector<std::uint8_t>& values,
                                   int width,
                                   const RegionOfInterest& region) {
@@ -138,7 +138,7 @@ std::vector<std::uint8_t> part_of(const std::vector<std::uint8_t>& values,
   return part;
 }
 
-/// The corner of the detector's first whole stage pixel where a region's lie on the same grid.
+/// The corner of the detector's first whole stage pixel, on the grid of a region's stage pixels.
 Eigen::Vector2i first_corner(const RegionOfInterest& region, int step) {
   return {region.column % step, region.row % step};
 }
@@ -152,7 +152,7 @@ SimilarityOptions similarity_of(const StageOptions& stage) {
 
 }  // namespace
 
-/// A view as several stages see it: most of a method's stages share their grids.
+/// A view as several stages see it. Most stages of a method share their grids.
 class SeenView {
  public:
   SeenView(const RegistrationProblem& problem, const RegistrationView& view)
@@ -162,7 +162,7 @@ class SeenView {
 
   [[nodiscard]] const RegistrationView& view() const { return view_; }
 
-  /// The X-ray of a region as a stage compares it with DRRs; InputError when nothing can be
+  /// The X-ray of a region as a stage compares it with DRRs. Throws InputError when nothing can be
   /// compared with it.
   SimilarityReference reference(const StageGrid& grid, const RegionOfInterest& region) {
     if (region != nominal_region_) return checked(elsewhere(grid, region));
@@ -190,8 +190,8 @@ class SeenView {
                            visible(scaled_region(view, grid), grid.pixel_step));
   }
 
-  /// As seen(), but cut out of the whole detector, which is kept, where the stage pixels lie as
-  /// they do at the nominal pose; else the region has been cut at the detector's edge.
+  /// Like seen(), but cut out of the whole detector, which is kept, if the stage pixels lie as they
+  /// do at the nominal pose. Otherwise the region has been cut at the detector's edge.
   SimilarityReference elsewhere(const StageGrid& grid, const RegionOfInterest& region) {
     const CameraGeometry& camera = view_.view.camera;
     const int step = grid.pixel_step;
@@ -358,7 +358,7 @@ bool PreparedStage::place_at(const RegistrationProblem& problem,
   try {
     if (there != regions)
       *this = stage_over(problem, options, views, std::move(there), objective.pool());
-  } catch (const InputError&) {  // an X-ray without contrast there
+  } catch (const InputError&) {  // the X-ray has no contrast there
     return false;
   }
   return narrow_to(problem, room_from_ct);

@@ -16,7 +16,7 @@ RegistrationOptions one_chain(ChainOptions chain) {
   return options;
 }
 
-/// The two passes of the paper (Sec. III-B2). The paper lost the value of its sigma;
+/// The two passes of the paper (Sec. III-B2). The paper lost the value of its sigma, and
 /// register/README.md says how we chose ours.
 RegistrationOptions paper_preset() {
   StageOptions smoothed;
@@ -39,17 +39,17 @@ RegistrationOptions fast_preset() {
                                    "gc quasi-newton level=1 pixels=2 step=2 final=0.02"));
 }
 
-/// The end of a chain convinces when it explains this share of the X-rays' gradients: where X-rays
-/// were clean, wrong vertebrae came to 0.51 and right poses to 0.69 or more.
+/// The end of a chain is convincing when it explains this share of the X-rays' gradients. Where
+/// X-rays were clean, wrong vertebrae reached 0.51, and right poses 0.69 or more.
 constexpr double kConvincingValue = 0.6;
 
-/// Below it a pose does not explain an X-ray well (kWellExplained). Where the last resort ran only
-/// below 0.2, two starts were lost whose best ends had 0.21 and 0.26; right poses of 81 patients
+/// Below this a pose does not explain an X-ray well (kWellExplained). When the last resort ran only
+/// below 0.2, two starts were lost whose best ends had 0.21 and 0.26. Right poses of 81 patients
 /// under every stress at once had 0.298 or more (docs/robust-tuning.md). \test
 /// Presets.TheLastResortRunsBelowWhatIsWellExplained
 constexpr double kLastResortBelow = 0.3;
 
-/// Every chain ends over the region alone at level 1: at level 2 steel and scatter have optima of
+/// Every chain ends over the region alone, at level 1. At level 2, steel and scatter have optima of
 /// their own there, which the judge cannot undo.
 constexpr const char* kOverTheRegion = "rg gauss-newton level=1 pixels=4 final=0.1";
 
@@ -69,10 +69,10 @@ ChainOptions again_chain(const std::string& name, const std::string& search) {
 
 /// Three chains search with different measures or at different levels, because each has its deepest
 /// optimum in a wrong place for some patients (docs/robust-tuning.md). If no end looks found, a
-/// fourth searches more widely, by plain correlation: from starts far along a long object, or
-/// turned far, the others went out of sight (docs/real-xrays.md, docs/robust-tuning.md). If none
-/// convinces, the last two search about the best end, finer than the others: where anatomy moved
-/// about the target, they ended some mm beside it.
+/// fourth searches more widely, by plain correlation. The others went out of sight from starts far
+/// along a long object, or turned far (docs/real-xrays.md, docs/robust-tuning.md). If none
+/// convinces, the last two search about the best end, finer than the others, which ended some mm
+/// beside it where anatomy moved about the target.
 RegistrationOptions robust_preset() {
   ChainOptions far = wide_chain("far", "ncc cma-es level=3 pixels=8 step=20");
   far.only_below = kLastResortBelow;
@@ -92,7 +92,7 @@ RegistrationOptions robust_preset() {
   return options;
 }
 
-/// The last stage sees every pixel: where pixels are as large as CT voxels, simulated bones ended
+/// The last stage sees every pixel. Where pixels are as large as CT voxels, simulated bones ended
 /// 0.3 mm and 1 degree off with pixels=2, and 0.04 mm and 0.1 degrees off with pixels=1
 /// (docs/howto/bones.md).
 RegistrationOptions bone_preset() {

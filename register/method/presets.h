@@ -8,7 +8,7 @@ namespace af::registration {
 std::vector<std::string> preset_names();
 /// One line for --help.
 std::string preset_help();
-/// InputError that lists the known names.
+/// The preset of that name. Throws InputError that lists the known names.
 RegistrationOptions preset_options(const std::string& name);
 
 }  // namespace af::registration

@@ -18,11 +18,11 @@
 namespace af::registration {
 namespace {
 
-/// What the text of a last resort begins with.
+/// The text of a last resort begins with this.
 constexpr std::string_view kLastResort = "below ";
 
-/// What the text of a chain that starts from the best end so far begins with, after any
-/// 'below VALUE:'.
+/// The text of a chain that starts from the best end so far begins with this, after any 'below
+/// VALUE:'.
 constexpr std::string_view kAgain = "again:";
 
 void add_once(const std::string& name, std::vector<std::string>& names) {
@@ -62,14 +62,14 @@ bool parse(const std::string& text, Number& value) {
   return error == std::errc() && stop == end;
 }
 
-/// A number of a stage; stages have int and double ones only.
+/// Visits a number of a stage. Stages have only int and double ones.
 template <typename Visitor>
 auto visit_number(const Field& field, const Visitor& visitor) {
   if (int* const* const whole = std::get_if<int*>(&field.value)) return visitor(**whole);
   return visitor(*std::get<double*>(field.value));
 }
 
-/// As it is typed in a chain.
+/// A field's key as it is typed in a chain.
 std::string key_of(const Field& field) {
   return field.option.substr(field.option.find_first_not_of('-'));
 }

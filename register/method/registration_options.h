@@ -32,14 +32,14 @@ struct StageOptions {
 
 std::vector<std::string> problems(const StageOptions& stage);
 
-/// Stages from coarse to fine, each starting where the one before ended.
+/// Stages from coarse to fine. Each starts where the one before ended.
 struct ChainOptions {
   std::string name;
   std::vector<StageOptions> stages;
   /// In a portfolio, a last resort: the chain runs only if the judge scores the best end of the
-  /// chains before it below this (mean over views). Infinity: it always runs.
+  /// earlier chains below this (mean over views). Infinity: it always runs.
   double only_below = std::numeric_limits<double>::infinity();
-  /// In a portfolio: starts from the best end of the chains before it, not from the registration's
+  /// In a portfolio: starts from the best end of the earlier chains instead of the registration's
   /// start.
   bool from_best_end = false;
 
@@ -48,33 +48,34 @@ struct ChainOptions {
   }
 };
 
-/// A chain as one line: stages separated by ';', each a measure and an optimiser followed by
-/// key=value, for example
+/// A chain as one line. Stages are separated by ';', and each is a measure and an optimiser
+/// followed by key=value, for example
 ///
 ///     ncc gauss-newton level=2 pixels=8 roi=2 step=10 final=0.5; gc gauss-newton level=1 pixels=2
 ///
 /// Keys are the options that StageOptions describes. A last resort begins with the value that calls
-/// it: "below 0.2: ncc cma-es ...". Then "again: " may follow: the chain starts from the best end.
+/// it: "below 0.2: ncc cma-es ...". Then "again: " may follow, which starts the chain from the best
+/// end.
 std::string chain_text(const ChainOptions& chain);
 
-/// Parses the line of a chain. InputError for a line of another form; problems() checks the values.
-/// \test ChainText.ReadsWhatItWrites
+/// Parses the line of a chain. Throws InputError for a line of another form; problems() checks the
+/// values. \test ChainText.ReadsWhatItWrites
 ChainOptions chain_from_text(const std::string& name, const std::string& text);
 
-/// The keys of a chain's line, each with what it means, for --help.
+/// The keys of a chain's line and their meanings, for --help.
 std::string chain_keys_help();
 
 /// How a portfolio chooses among the ends of its chains: by the value of rg, the share of the
 /// X-rays' gradients that a DRR explains.
 struct JudgeOptions {
   StageOptions stage;         ///< its optimiser is not used
-  double least_value = 0.0;   ///< mean over views; at or below it, the registration has failed
-  double enough_value = 1.0;  ///< mean over views; an end at or above ends the portfolio
+  double least_value = 0.0;   ///< mean over views; at or below it the registration has failed
+  double enough_value = 1.0;  ///< mean over views; an end at or above it ends the portfolio
 
   JudgeOptions();
 };
 
-/// Silhouettes leave out the edges that a CT has where it is cut.
+/// Silhouettes leave out the edges where a CT is cut.
 inline constexpr const char* kSilhouettesNeedTheCt =
     "skip_ct_check = set: must be left out where a stage looks within the CT's silhouette, because "
     "the CT says where it is cut";
@@ -82,13 +83,13 @@ inline constexpr const char* kSilhouettesNeedTheCt =
 /// How to register: one chain, or a portfolio of several.
 struct RegistrationOptions {
   std::vector<ChainOptions> chains;
-  /// Stages that follow the chain, or a portfolio's best end and those that the judge can hardly
-  /// tell from it; may be empty.
+  /// Stages that follow the chain, or that follow a portfolio's best end and those that the judge
+  /// can hardly tell from it. May be empty.
   ChainOptions finish;
-  JudgeOptions judge;          ///< of a portfolio; not used with one chain
+  JudgeOptions judge;          ///< for a portfolio; not used with one chain
   int max_evaluations = 5000;  ///< pose evaluations per registration, all chains together
-  std::uint64_t seed = 1;      ///< of optimisers that draw random numbers
-  /// Whether problems are to be made with regions that follow the target (region_at()).
+  std::uint64_t seed = 1;      ///< for optimisers that draw random numbers
+  /// Whether problems should have regions that follow the target (region_at()).
   bool region_follows_target = true;
   CorrectionOptions correction;
 
@@ -104,11 +105,12 @@ struct RegistrationOptions {
   [[nodiscard]] double silhouette_mm() const;
   /// Highest level of any stage.
   [[nodiscard]] int coarsest_level() const;
-  /// Levels of the stages that a registration can end with, ascending: a correction casts there.
+  /// Levels of the stages that a registration can end with, ascending. A correction casts rays
+  /// there.
   [[nodiscard]] std::vector<int> last_levels() const;
 
  private:
-  /// Of all chains and of the finish, in this order.
+  /// Stages of all chains, then of the finish.
   [[nodiscard]] std::vector<const StageOptions*> stages() const;
   [[nodiscard]] std::vector<StageOptions*> stages();
 };

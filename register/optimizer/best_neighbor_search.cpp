@@ -11,7 +11,7 @@ namespace {
 
 struct Neighborhood {
   bool is_complete = true;               ///< false: the search has ended
-  std::optional<ScaledParameters> best;  ///< none beats the present point
+  std::optional<ScaledParameters> best;  ///< none beats the current point
   double best_value = 0.0;
   bool has_inadmissible = false;
 };

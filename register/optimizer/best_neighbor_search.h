@@ -5,10 +5,10 @@
 
 namespace af::registration {
 
-/// The paper's optimiser (Sec. III-B2): of the 12 neighbours (one step down and one up along each
-/// parameter: -rx, +rx, -ry, ... +tz) move to the best when it beats the present point, ties going
-/// to the first in that order; otherwise halve the step, the last step being final_step_mm exactly.
-/// Inadmissible neighbours are passed over. \test
+/// The paper's optimiser (Sec. III-B2). Of the 12 neighbours (one step down and one up along each
+/// parameter: -rx, +rx, -ry, ... +tz) it moves to the best when that beats the current point, and
+/// to the first in that order when several are equal. Otherwise it halves the step. The last step
+/// is exactly final_step_mm. Inadmissible neighbours are skipped. \test
 /// BestNeighborSearch.FindsAQuadraticsMaximumToTheFinalStep
 void best_neighbor_search(OptimizationTarget& target,
                           const OptimizerOptions& options,

@@ -56,7 +56,7 @@ struct Sample {
   double value = -std::numeric_limits<double>::infinity();
 };
 
-/// The distribution that points are drawn from.
+/// The distribution from which points are drawn.
 struct Distribution {
   ScaledParameters mean = ScaledParameters::Zero();
   double sigma = 1.0;
@@ -139,12 +139,12 @@ void cma_es(OptimizationTarget& target,
           is_admissible ? evaluations[i].target.value : -std::numeric_limits<double>::infinity();
       if (is_admissible) run.offer(points[i], samples[i].value);
     }
-    // Stable: equal values keep the order of drawing.
+    // A stable sort keeps equal values in the order of drawing.
     std::stable_sort(samples.begin(), samples.end(), [](const Sample& a, const Sample& b) {
       return a.value > b.value;
     });
     if (met_limit)
-      distribution.sigma /= 2.0;  // nothing to learn from: draw nearer
+      distribution.sigma /= 2.0;  // there is nothing to learn from, so draw nearer
     else
       adapt(constants, samples, generation, distribution);
     run.trace(distribution.largest_deviation());

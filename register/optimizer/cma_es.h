@@ -6,10 +6,10 @@
 namespace af::registration {
 
 /// Covariance matrix adaptation (Hansen, The CMA Evolution Strategy: A Tutorial, arXiv:1604.00772,
-/// with its default constants): for wide starts and rough targets. The first standard deviation is
-/// initial_step_mm; the search has converged when the largest one falls below final_step_mm. An
-/// inadmissible point ranks last. Random numbers are counted, keyed by budget.random_key: the same
-/// key gives the same search. \test CmaEs.FindsTheHighestOfManyPeaks
+/// with its default constants), for wide starts and rough targets. The first standard deviation is
+/// initial_step_mm. The search has converged when the largest one falls below final_step_mm. An
+/// inadmissible point ranks last. Random numbers are counter-based, keyed by budget.random_key: the
+/// same key gives the same search. \test CmaEs.FindsTheHighestOfManyPeaks
 void cma_es(OptimizationTarget& target,
             const OptimizerOptions& options,
             const SearchBudget& budget,

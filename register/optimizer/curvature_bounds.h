@@ -5,8 +5,8 @@
 
 namespace af::registration {
 
-/// `curvature` with its sizes along the directions that it shares with `scale` kept between `least`
-/// and `most` of the scale's, so that it bends downwards where it did not; the scale itself where
+/// `curvature`, with its sizes along the directions that it shares with `scale` kept between
+/// `least` and `most` of the scale's, so that it bends downwards everywhere. The scale itself where
 /// that is not positive definite. \test CurvatureBounds.KeepWhatIsWithin
 ScaledMatrix kept_between(const ScaledMatrix& curvature,
                           const ScaledMatrix& scale,

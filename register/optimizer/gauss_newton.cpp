@@ -15,7 +15,7 @@ namespace {
 /// An update whose divisor is smaller, relative to its vectors, would be mostly rounding.
 constexpr double kLeastCosine = 1e-3;
 
-/// Longer steps were rejected too often: far away, gradients say little about the optimum.
+/// Longer steps were rejected too often, because gradients say little about an optimum far away.
 constexpr double kLeastShare = 1.0 / 3.0;
 constexpr double kMostShare = 3.0;
 
@@ -25,16 +25,16 @@ constexpr double kMostDamping = 1e12;
 constexpr double kDampingFactor = 10.0;
 
 /// A parameter that hardly changes the residuals (a translation along the only view's beam) is
-/// damped as if its curvature were this share of the largest one, so that its steps stay finite.
+/// damped as if its curvature were this share of the largest one. That keeps its steps finite.
 constexpr double kLeastCurvatureShare = 1e-6;
 
 /// The curvature that normal equations leave out, learned from accepted steps.
 ///
-/// DRRs are not linear in the pose, so that where residuals are large the target curves otherwise
-/// than its matrix says, and steps by this alone converge only linearly. The difference follows
-/// from the gradients on either side of a step, by symmetric rank-one updates: a structured
-/// quasi-Newton method (Dennis, Gay and Welsch, An Adaptive Nonlinear Least-Squares Algorithm, ACM
-/// TOMS 7(3), 1981; Nocedal and Wright, Numerical Optimization, 2006, eq. (6.24)).
+/// DRRs are not linear in the pose. Where residuals are large, the target therefore curves
+/// differently from its matrix, and steps by the matrix alone converge only linearly. The
+/// difference follows from the gradients on both sides of a step, by symmetric rank-one updates: a
+/// structured quasi-Newton method (Dennis, Gay and Welsch, An Adaptive Nonlinear Least-Squares
+/// Algorithm, ACM TOMS 7(3), 1981; Nocedal and Wright, Numerical Optimization, 2006, eq. (6.24)).
 class LearnedCurvature {
  public:
   [[nodiscard]] bool is_empty() const { return is_empty_; }
@@ -43,8 +43,9 @@ class LearnedCurvature {
   /// Learns from a step between two points with gradients and normal equations.
   void learn(const ScaledParameters& step, const TargetValue& before, const TargetValue& after);
 
-  /// The normal equations `matrix` (positive definite) with what was learned. Along every direction
-  /// the curvature stays within 1/3 and 3 of the matrix's: a step is at most three times as long.
+  /// The normal equations `matrix` (positive definite) plus what was learned. Along every direction
+  /// the curvature stays within 1/3 and 3 of the matrix's, so a step is at most three times as
+  /// long.
   [[nodiscard]] ScaledMatrix added_to(const ScaledMatrix& matrix) const;
 
  private:
@@ -86,8 +87,8 @@ ScaledParameters damped_step(const TargetValue& at,
   return length > longest_mm ? ScaledParameters(step * (longest_mm / length)) : step;
 }
 
-/// Damping after a rejected step, without what was learned: raised until a step is at most half as
-/// long. Small dampings hardly change a step, so that it would be evaluated and rejected again.
+/// Damping after a rejected step, without what was learned. It is raised until a step is at most
+/// half as long: a small rise hardly changes a step, which would be evaluated and rejected again.
 double raised_damping(const TargetValue& at, double damping, double rejected_mm) {
   do damping *= kDampingFactor;
   while (damping < kMostDamping &&
@@ -95,7 +96,7 @@ double raised_damping(const TargetValue& at, double damping, double rejected_mm)
   return damping;
 }
 
-/// `learns`: curvature from the steps, too.
+/// `learns`: whether to learn curvature from the steps too.
 void damped_newton(LeastSquaresTarget& target,
                    const OptimizerOptions& options,
                    const SearchBudget& budget,
@@ -114,7 +115,7 @@ void damped_newton(LeastSquaresTarget& target,
     const ScaledParameters wanted = damped_step(*at, learned, damping, options.initial_step_mm);
     const ScaledParameters point = run.stepped(wanted);
     const ScaledParameters step = point - result.point;
-    // No step follows the last one: it needs no derivatives.
+    // No step follows the last one, so it needs no derivatives.
     const bool is_last = step.norm() < options.final_step_mm;
     const SearchRun::Evaluation next =
         is_last ? run.evaluate(point) : run.evaluate(point, with_equations);
@@ -130,7 +131,7 @@ void damped_newton(LeastSquaresTarget& target,
       damping = std::max(damping / kDampingFactor, kLeastDamping);
       met_limit = false;
     } else {
-      // First without what was learned: it may have made the step too long.
+      // What was learned may have made the step too long, so it is dropped first.
       if (learned.is_empty()) damping = raised_damping(*at, damping, wanted.norm());
       learned.clear();
       met_limit = is_inadmissible;

@@ -6,11 +6,11 @@
 namespace af::registration {
 
 /// Levenberg and Marquardt on the normal equations of a sum of squares (Madsen, Nielsen, Tingleff,
-/// Methods for Non-Linear Least Squares Problems, 2004, Sec. 3.2): the step solves (H + lambda
-/// diag H) h = g and is no longer than initial_step_mm; a better point lowers lambda; after a worse
-/// or inadmissible one, and another try without what was learned, lambda rises until the step,
-/// before limits trim it, is at most half as long, which also turns it; until a step falls below
-/// final_step_mm. \test GaussNewton.EndsAQuadraticInAFewSteps,
+/// Methods for Non-Linear Least Squares Problems, 2004, Sec. 3.2). The step solves (H + lambda diag
+/// H) h = g and is no longer than initial_step_mm. A better point lowers lambda. After a worse or
+/// inadmissible one, the step is tried again without what was learned. Then lambda rises until the
+/// step, before limits trim it, is at most half as long, which also turns it. The search ends when
+/// a step falls below final_step_mm. \test GaussNewton.EndsAQuadraticInAFewSteps,
 /// GaussNewton.HalvesRejectedStepsAtLeast, QuasiNewton.LearnsMissingCurvature
 void gauss_newton(LeastSquaresTarget& target,
                   const OptimizerOptions& options,

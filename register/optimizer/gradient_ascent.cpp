@@ -13,7 +13,7 @@ namespace {
 constexpr std::size_t kMemory = 6;
 /// A step counts when the value rises by this share of what the gradient promises.
 constexpr double kSufficientRise = 1e-4;
-/// First step after the memory was dropped, in final steps.
+/// First step after the memory was dropped, in units of the final step.
 constexpr double kRestartLength = 8.0;
 
 /// One accepted step and the fall of the gradient along it.
@@ -42,7 +42,7 @@ ScaledParameters ascent_direction(const std::deque<Change>& changes,
   return direction;
 }
 
-/// The first step of a search has the longest length allowed; so has any step that would be longer.
+/// The step, bounded by the longest length allowed. The first step of a search has that length.
 ScaledParameters bounded_step(const std::deque<Change>& changes,
                               const ScaledParameters& gradient,
                               double longest_mm) {
@@ -106,8 +106,7 @@ void gradient_ascent(DifferentiableTarget& target,
       run.converge(met_limit, options.final_step_mm);
       return;
     }
-    // A memory of well-known directions gives short steps, too; therefore the gradient decides
-    // last.
+    // A memory of well-known directions gives short steps too, so the gradient decides last.
     changes.clear();
     step = at->gradient.normalized() * (kRestartLength * options.final_step_mm);
   }

@@ -13,13 +13,13 @@ namespace {
 
 /// Least curvature as a share of the target's own matrix: that of Gauss and Newton, or less where
 /// the measure reweights its residuals (PoseTarget). Measured curvatures below this share, or above
-/// the matrix, are taken for errors of the differences.
+/// the matrix, count as errors of the differences.
 constexpr double kLeastShareOfGaussNewton = 0.03;
 
-/// Least curvature over the largest one, where Gauss and Newton's is not known.
+/// Least curvature relative to the largest one, where Gauss and Newton's is unknown.
 constexpr double kLeastCurvatureOverLargest = 1e-6;
 
-/// A value lower by this share does not count as worse: near an optimum, ray sampling errors change
+/// A value lower by this share does not count as worse. Near an optimum, ray sampling errors change
 /// values more than the pose does, and the derivatives are more reliable.
 constexpr double kValueNoise = 1e-4;
 
@@ -34,7 +34,7 @@ ScaledMatrix bent_downwards(const ScaledMatrix& curvature, const ScaledMatrix& g
   if (gauss_newton.llt().info() == Eigen::Success)
     return kept_between(curvature, gauss_newton, kLeastShareOfGaussNewton, 1.0);
   const double largest = curvature.norm();
-  // No difference could be taken: steps then follow the gradient until evaluations tell more.
+  // No difference could be taken. Steps then follow the gradient until evaluations tell more.
   if (!(largest > 0.0)) return ScaledMatrix::Identity();
   return kept_between(
       curvature, largest * ScaledMatrix::Identity(), kLeastCurvatureOverLargest, 1.0);
@@ -49,8 +49,8 @@ ScaledParameters newton_step(const ScaledMatrix& curvature,
   return length > longest_mm ? ScaledParameters(step * (longest_mm / length)) : step;
 }
 
-/// The gradient fell by `fall` along `step`. Skips a correction after which the target would no
-/// longer bend downwards.
+/// Corrects the curvature when the gradient fell by `fall` along `step`. Skips a correction after
+/// which the target would no longer bend downwards.
 void correct_curvature(const ScaledParameters& step,
                        const ScaledParameters& fall,
                        ScaledMatrix& curvature) {

@@ -24,7 +24,7 @@ struct Callback {
   SearchRun& run;
   nlopt_opt optimizer;
   double worst_value;
-  bool met_limit = false;  ///< by a point since the best one
+  bool met_limit = false;  ///< whether a point since the best one met it
   bool has_ended = false;
   std::exception_ptr failure;
 };
@@ -33,7 +33,7 @@ double value_for_nlopt(unsigned /*count*/, const double* x, double* /*gradient*/
   auto& callback = *static_cast<Callback*>(data);
   try {
     const ScaledParameters wanted = Eigen::Map<const ScaledParameters>(x);
-    // Beyond known limits models see a smooth slope, down from the value at the limit, not a cliff.
+    // Beyond known limits, models see a smooth slope down from the value at the limit, not a cliff.
     const ScaledParameters point = callback.target.nearest_admissible(wanted);
     const SearchRun::Evaluation evaluation = callback.run.evaluate(point);
     if (evaluation.outcome == SearchRun::Outcome::Value) {
@@ -58,7 +58,8 @@ double value_for_nlopt(unsigned /*count*/, const double* x, double* /*gradient*/
     callback.failure = std::current_exception();
     nlopt_force_stop(callback.optimizer);
   }
-  // Finite, so that BOBYQA's models stay defined, and less than any admissible value so far.
+  // The value is finite, so that BOBYQA's models stay defined, and less than any admissible value
+  // so far.
   const double best = callback.run.result().value;
   return callback.worst_value - 0.1 * (best - callback.worst_value);
 }
@@ -86,7 +87,7 @@ void nlopt_search(nlopt_algorithm algorithm,
                   "NLopt takes a final step");
   ScaledParameters point = ScaledParameters::Zero();
   double value = 0.0;
-  // NLopt's own result does not matter, only what the callback saw: BOBYQA also reports a failure
+  // NLopt's own result does not matter, only what the callback saw. BOBYQA also reports a failure
   // when rounding stopped its steps.
   nlopt_optimize(optimizer.get(), point.data(), &value);
   if (callback.failure) std::rethrow_exception(callback.failure);

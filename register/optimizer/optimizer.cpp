@@ -15,7 +15,7 @@
 namespace af::registration {
 namespace {
 
-/// A new optimiser joins here.
+/// Every optimiser. A new one is added here.
 constexpr std::array kOptimizers = {
     Optimizer{"best-neighbor", "the paper's: best of 12 neighbours", best_neighbor_search},
     Optimizer{"gauss-newton", "steps from normal equations", gauss_newton},

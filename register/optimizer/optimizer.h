@@ -20,14 +20,14 @@ enum class StopReason {
   StepBelowFinal,         ///< converged: no better point at the final step
   EvaluationBudgetSpent,  ///< max_evaluations reached
   PinnedAtLimit,          ///< converged, but points a final step away are inadmissible
-  StartInadmissible,      ///< the field does not hold all rays of the start
+  StartInadmissible,      ///< the field does not hold all rays at the start
   CtOutsideRoi,           ///< no CT point projects into a region of interest: steps undefined
   NonFiniteSimilarity,    ///< the similarity is NaN or infinite
   NoBetterThanNoDrr,      ///< no chain of a portfolio explains the X-rays better than no DRR
 };
 
-/// "step-below-final", "evaluation-budget-spent", "pinned-at-limit", "start-inadmissible",
-/// "ct-outside-roi", "non-finite-similarity", "no-better-than-no-drr": as in result files.
+/// The names in result files: "step-below-final", "evaluation-budget-spent", "pinned-at-limit",
+/// "start-inadmissible", "ct-outside-roi", "non-finite-similarity", "no-better-than-no-drr".
 const char* to_string(StopReason reason);
 
 /// Six pose parameters (rx, ry, rz, tx, ty, tz) scaled so that one unit of each moves projected CT
@@ -35,7 +35,7 @@ const char* to_string(StopReason reason);
 using ScaledParameters = Eigen::Matrix<double, 6, 1>;
 using ScaledMatrix = Eigen::Matrix<double, 6, 6>;
 
-/// The twelve points one step away from a point along one parameter, forth and back.
+/// The twelve points one step away from a point along one parameter, back and forth.
 std::array<ScaledParameters, 12> neighbors(const ScaledParameters& point, double step_mm);
 
 /// What an optimiser asks of its target.
@@ -45,7 +45,7 @@ enum class Derivatives {
   NormalEquations,  ///< and a positive semi-definite approximation of the negative Hessian
 };
 
-/// A target at a point, with the derivatives that were asked for.
+/// The value of a target at a point, with the requested derivatives.
 struct TargetValue {
   double value = 0.0;
   ScaledParameters gradient = ScaledParameters::Zero();
@@ -57,13 +57,12 @@ class OptimizationTarget {
  public:
   virtual ~OptimizationTarget() = default;
 
-  /// nullopt: the point is inadmissible.
+  /// nullopt when the point is inadmissible.
   virtual std::optional<double> evaluate(const ScaledParameters& point) = 0;
-  /// The same for points that do not depend on each other, as many `values`: targets may evaluate
-  /// them at the same time.
+  /// The same for independent points, one of `values` each. Targets may evaluate them concurrently.
   virtual void evaluate_all(std::span<const ScaledParameters> points,
                             std::span<std::optional<double>> values);
-  /// The point, or one near it that known limits admit (it may still turn out inadmissible).
+  /// The point, or one near it within known limits. It may still turn out to be inadmissible.
   [[nodiscard]] virtual ScaledParameters nearest_admissible(const ScaledParameters& point) const {
     return point;
   }
@@ -72,11 +71,11 @@ class OptimizationTarget {
 /// A target with first derivatives.
 class DifferentiableTarget : public OptimizationTarget {
  public:
-  /// The matrix is 0. nullopt: the point is inadmissible.
+  /// The matrix is 0. nullopt when the point is inadmissible.
   virtual std::optional<TargetValue> evaluate_with_gradient(const ScaledParameters& point) = 0;
 };
 
-/// A target with a positive semi-definite approximation of its negative Hessian, too.
+/// A target that also has a positive semi-definite approximation of its negative Hessian.
 class LeastSquaresTarget : public DifferentiableTarget {
  public:
   virtual std::optional<TargetValue> evaluate_with_normal_equations(
@@ -95,7 +94,7 @@ struct OptimizerOptions {
 struct OptimizerIteration {
   double step_mm = 0.0;  ///< of the points examined
   double value = 0.0;    ///< best value after the iteration
-  int evaluations = 0;   ///< so far, this search
+  int evaluations = 0;   ///< so far in this search
   ScaledParameters point = ScaledParameters::Zero();
 };
 
@@ -103,7 +102,7 @@ struct OptimizerResult {
   ScaledParameters point = ScaledParameters::Zero();
   double value = 0.0;  ///< NaN when the start is inadmissible
   int evaluations = 0;
-  int inadmissible = 0;  ///< of these, points that were inadmissible
+  int inadmissible = 0;  ///< how many of these points were inadmissible
   StopReason stop_reason = StopReason::StepBelowFinal;
   std::vector<OptimizerIteration> trace;
 };
@@ -114,8 +113,8 @@ struct SearchBudget {
   std::uint64_t random_key = 0;  ///< of (seed, case, start); only cma-es draws
 };
 
-/// A search from the origin of the scaled parameters. What it takes for a target says what it asks
-/// of it. The same target, options and budget give the same result, which is overwritten, its
+/// A search from the origin of the scaled parameters. The type of its target says which derivatives
+/// it needs. The same target, options and budget give the same result, which is overwritten and its
 /// memory reused.
 template <typename Target>
 using Search = void (*)(Target& target,
@@ -138,9 +137,9 @@ struct Optimizer {
   }
 };
 
-/// Every optimiser there is.
+/// Every optimiser.
 std::span<const Optimizer> known_optimizers();
-/// InputError that lists the known names.
+/// The optimiser of that name. Throws InputError that lists the known names.
 const Optimizer& known_optimizer(const std::string& name);
 
 /// Their names, and one line that explains them.

@@ -47,7 +47,7 @@ SearchRun::Evaluation SearchRun::counted(const std::optional<TargetValue>& found
     return {Outcome::Inadmissible, {}};
   }
   if (!std::isfinite(found->value) || !found->gradient.allFinite()) {
-    // A start without a finite value is reported with its value all the same.
+    // A start without a finite value is still reported with its value.
     if (result_.evaluations == 1) result_.value = found->value;
     result_.stop_reason = StopReason::NonFiniteSimilarity;
     return {};

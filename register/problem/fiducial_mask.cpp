@@ -8,7 +8,7 @@
 namespace af::registration {
 namespace {
 
-/// The first and one past the last of `size` pixels whose centres may lie within radius_px.
+/// The range [first, one past the last) of `size` pixels whose centres may lie within radius_px.
 std::pair<int, int> pixels_about(double center_px, double radius_px, int size) {
   const double last = static_cast<double>(size);
   return {static_cast<int>(std::clamp(std::ceil(center_px - radius_px), 0.0, last)),

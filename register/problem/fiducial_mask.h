@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Keeps the markers of the gold standard out of the registration that it judges.
+// Keeps the markers of the gold standard out of the registration that they judge.
 #pragma once
 
 #include <vector>
@@ -11,9 +11,9 @@
 
 namespace af::registration {
 
-/// `mask` (whole detector, non-zero = used; empty: every pixel) with 0 where a pixel's centre lies
-/// within `radius_px` of a fiducial's projection (column, row; NaN: the view hides it). `mask`
-/// itself when there is no fiducial or the radius is 0.
+/// `mask` (whole detector, non-zero = used; empty: every pixel), with 0 where a pixel's centre lies
+/// within `radius_px` of a fiducial's projection (column, row; NaN: the view hides it). Returns
+/// `mask` itself when there is no fiducial or the radius is 0.
 Image2d mask_fiducials(Image2d mask,
                        const CameraGeometry& camera,
                        const std::vector<Eigen::Vector2d>& fiducials_px,

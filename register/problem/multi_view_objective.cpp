@@ -12,13 +12,13 @@
 namespace af::registration {
 namespace {
 
-/// The measure of a view by what it can do, which problems(StageOptions) asks before.
+/// A view's measure as the type of what it can do. problems(StageOptions) has checked that before.
 template <typename Measure>
 const Measure& measure_as(const ObjectiveView& view) {
   return dynamic_cast<const Measure&>(*view.measure);
 }
 
-/// Value and gradient from the derivative by every pixel.
+/// Value and gradient from the derivative with respect to every pixel.
 NormalEquations gradient_equations(const DifferentiableMeasure& measure,
                                    std::span<const float> drr,
                                    std::span<const float> planes,
@@ -39,7 +39,7 @@ NormalEquations gradient_equations(const DifferentiableMeasure& measure,
   return result;
 }
 
-/// The gradient by tiles of the view's region.
+/// The gradient split over tiles of the view's region.
 TileScores tile_scores(const RegionOfInterest& roi,
                        int tiles,
                        std::span<const float> planes,
@@ -181,7 +181,7 @@ void MultiViewObjective::evaluate_all(std::span<const RigidTransform> room_from_
     const auto i = static_cast<std::size_t>(task / view_count);
     const auto view = static_cast<std::size_t>(task % view_count);
     if (!poses_[i].is_in_range) return;
-    // Every view of one pose has memory of its own, whichever thread takes it.
+    // Every view of one pose has its own memory, whichever thread takes it.
     Scratch& scratch = scratch_of(pose_count == 1 ? 0 : slot, view);
     evaluate_view(i, room_from_ct[i], view, scratch, std::nullopt, [&](NormalEquations& part) {
       part.value = views_[view].measure->evaluate(scratch.drr, *scratch.similarity);

@@ -25,7 +25,7 @@ struct MotionLimit {
   }
 };
 
-/// One view as an objective sees it; the pointers' targets outlive the objective.
+/// One view as an objective sees it. The targets of its pointers must outlive the objective.
 struct ObjectiveView {
   View view;
   std::shared_ptr<const DrrRenderer> renderer;
@@ -36,18 +36,18 @@ struct ObjectiveView {
 struct ObjectiveValue {
   double similarity = 0.0;        ///< sum over views; NaN when inadmissible
   bool is_admissible = false;     ///< inside every view's limit and no ray outside a field
-  std::int64_t rays_outside = 0;  ///< of the first view that has any
+  std::int64_t rays_outside = 0;  ///< in the first view that has any
   int drr_count = 0;              ///< DRRs rendered for this value
 };
 
-/// The gradient of one view's similarity, split over the tiles of its region, row by row; the parts
-/// sum to the view's gradient. By small motions of the CT in the room, as PoseGradients (per rad,
-/// per mm).
+/// The gradient of one view's similarity, split over the tiles of its region, row by row. The parts
+/// sum to the view's gradient. It is with respect to small motions of the CT in the room, as in
+/// PoseGradients (per rad, per mm).
 using TileScores = std::vector<PoseVector>;
 
-/// Eq. (13): sum of the views' similarities at a pose. Owns the scratch memory: one objective at a
-/// time on a pool of threads, over which views and poses are spread. Values do not depend on the
-/// number of threads. Evaluations do not allocate, but for the first ones of a kind.
+/// Eq. (13): the sum of the views' similarities at a pose. It owns the scratch memory. Only one
+/// objective at a time may use a pool of threads, over which views and poses are spread. Values do
+/// not depend on the number of threads. Only the first evaluations of a kind allocate.
 class MultiViewObjective {
  public:
   /// `pool`: none means the calling thread alone.
@@ -58,18 +58,19 @@ class MultiViewObjective {
   /// One value per pose.
   void evaluate_all(std::span<const RigidTransform> room_from_ct, std::span<ObjectiveValue> values);
 
-  /// With derivatives, into `result`: by small motions of the CT in the room about
-  /// `pivot_room_point`, as PoseGradients (per rad, per mm). Derivatives::Gradient leaves the
-  /// matrix 0. The measures must be LeastSquaresMeasures, for a Gradient DifferentiableMeasures.
+  /// Evaluates with derivatives, into `result`. They are with respect to small motions of the CT in
+  /// the room about `pivot_room_point`, as in PoseGradients (per rad, per mm).
+  /// Derivatives::Gradient leaves the matrix 0. The measures must be LeastSquaresMeasures, or
+  /// DifferentiableMeasures for a Gradient.
   ObjectiveValue evaluate_with(const RigidTransform& room_from_ct,
                                const Eigen::Vector3d& pivot_room_point,
                                Derivatives derivatives,
                                NormalEquations& result);
 
-  /// The views one by one, the gradient of each split over `tiles` x `tiles` parts of its region:
-  /// sums of (derivative by a DRR pixel) x (derivative of that pixel by the pose). The measures
-  /// must be DifferentiableMeasures. `scores`: one per view; unchanged when the pose is
-  /// inadmissible.
+  /// Evaluates the views one by one. The gradient of each is split over `tiles` x `tiles` parts of
+  /// its region, as sums of (derivative by a DRR pixel) x (derivative of that pixel by the pose).
+  /// The measures must be DifferentiableMeasures. `scores`: one per view, unchanged when the pose
+  /// is inadmissible.
   ObjectiveValue evaluate_scores(const RigidTransform& room_from_ct,
                                  const Eigen::Vector3d& pivot_room_point,
                                  int tiles,
@@ -77,10 +78,10 @@ class MultiViewObjective {
 
   /// The parameters along which a pose is beyond the limit of any view.
   [[nodiscard]] ParameterSet beyond_limits(const RigidTransform& room_from_ct) const;
-  /// The pose, or the one nearest to it within the limits of all views, parameter by parameter.
+  /// The pose, or the nearest one within the limits of all views, parameter by parameter.
   [[nodiscard]] RigidTransform nearest_within_limits(const RigidTransform& room_from_ct) const;
 
-  /// Call before a search: says whether evaluations may make DRRs from node images of earlier ones
+  /// Says before a search whether evaluations may make DRRs from node images of earlier ones
   /// (RenderWorkspace::reuse_images()). If so, values depend on earlier poses until this is called
   /// again or several poses are evaluated at once.
   void reuse_images(bool is_allowed);
@@ -89,23 +90,23 @@ class MultiViewObjective {
   [[nodiscard]] const std::shared_ptr<ThreadPool>& pool() const { return pool_; }
 
  private:
-  /// Of one view and thread.
+  /// Memory for one view and thread.
   struct Scratch {
     std::unique_ptr<RenderWorkspace> render;
     std::unique_ptr<SimilarityWorkspace> similarity;
     std::vector<float> drr;
-    std::vector<float> planes;    ///< six, once derivatives were asked for
+    std::vector<float> planes;    ///< six, once derivatives have been asked for
     std::vector<float> by_pixel;  ///< likewise
   };
   /// What is known about one pose before its views are summed.
   struct PoseState {
     bool is_in_range = false;
-    int first_outside = 0;  ///< first view with rays outside; those after it do not count
+    int first_outside = 0;  ///< first view with rays outside; later ones do not count
   };
   /// The contribution of one view to the value of one pose.
   struct Part {
     std::int64_t rays_outside = 0;
-    NormalEquations equations;  ///< or the value alone
+    NormalEquations equations;  ///< or only the value
   };
 
   void prepare(std::span<const RigidTransform> room_from_ct);
@@ -119,10 +120,10 @@ class MultiViewObjective {
                      Scratch& scratch,
                      const std::optional<PoseGradients>& gradients,
                      const Compare& compare);
-  /// Forgets node images if pose `i` has rays outside: which of its views were rendered depends on
-  /// the threads and must not affect later values.
+  /// Forgets node images if pose `i` has rays outside. Which of its views were rendered depends on
+  /// the threads, and must not affect later values.
   void forget_images_of_refused(std::size_t i);
-  /// The sum over the views of pose `i`, in their order.
+  /// The sum over the views of pose `i`, in order.
   [[nodiscard]] ObjectiveValue sum_of(std::size_t i, NormalEquations& equations) const;
 
   std::vector<ObjectiveView> views_;

@@ -12,15 +12,15 @@ namespace af::registration {
 namespace {
 
 /// A parameter that moves projections by less than this (for example a translation along the only
-/// view's beam) is scaled as if it moved them by this much, which keeps its steps finite.
+/// view's beam) is scaled as if it moved them by this much. That keeps its steps finite.
 constexpr double kSmallestDisplacementMm = 1e-3;
 
-/// Motions that move projections less than this (of squares that are 1 for single parameters) are
-/// taken to move them so much, likewise.
+/// Likewise, motions that move projections by less than this (in squares that are 1 for single
+/// parameters) count as moving them by this much.
 constexpr double kLeastEigenvalue = 1e-6;
 
-/// Where measures that reweight their residuals curve less than this share of what their normal
-/// equations say, searches take them to curve by this share.
+/// Where measures that reweight their residuals curve by less than this share of what their normal
+/// equations say, searches assume this share.
 constexpr double kLeastShareOfNormalEquations = 0.03;
 
 bool projects_into(const PointProjector& projector,
@@ -55,8 +55,8 @@ ImageVelocities image_velocities(const PointProjector& projector,
   return velocities;
 }
 
-/// add(velocities) of every view for every point that projects into the region of at least one;
-/// returns how often.
+/// Calls add(velocities) for every view and every point that projects into the region of at least
+/// one. Returns how often.
 template <typename Add>
 std::size_t for_each_velocity(const RigidTransform& room_from_ct,
                               const Eigen::Vector3d& center_ct_mm,
@@ -153,7 +153,7 @@ std::optional<PoseMatrix> projected_motion_basis(const RigidTransform& room_from
   if (count == 0) return std::nullopt;
   squares /= static_cast<double>(count);
   const PoseVector sizes = squares.diagonal().cwiseSqrt().cwiseMax(kSmallestDisplacementMm);
-  // In parameters of like size, so that eigenvectors do not depend on units.
+  // Parameters are brought to like size, so that eigenvectors do not depend on units.
   const PoseMatrix alike =
       sizes.cwiseInverse().asDiagonal() * squares * sizes.cwiseInverse().asDiagonal();
   const Eigen::SelfAdjointEigenSolver<PoseMatrix> solver(alike);

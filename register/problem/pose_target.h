@@ -16,7 +16,7 @@
 namespace af::registration {
 
 /// How far one unit of each pose parameter moves the CT's projection, so that steps of all
-/// parameters compare.
+/// parameters can be compared.
 struct ParameterScaling {
   /// Mean displacement, in mm on the isocentre plane, per rad (rx, ry, rz) and per mm (tx, ty, tz).
   ScaledParameters displacement_mm = ScaledParameters::Ones();
@@ -30,11 +30,11 @@ std::vector<Eigen::Vector3d> ct_lattice_points(const CtGrid& grid, int points_pe
 /// The same for a box in the ct frame.
 std::vector<Eigen::Vector3d> ct_lattice_points(const CtBox& box, int points_per_axis = 24);
 
-/// Mean displacement (to first order, for rotations about the room's axes through `center_ct_mm`)
-/// of those `points_ct` that project into the region of interest of at least one view, on the plane
-/// through `isocenter_point` parallel to each view's detector, averaged over points and views, at
-/// `room_from_ct` (Sec. III-B2; docs/differences-from-the-paper.md says what the paper leaves
-/// open). nullopt when no point projects into a region.
+/// Mean displacement at `room_from_ct` of those `points_ct` that project into the region of
+/// interest of at least one view. It is taken to first order (for rotations about the room's axes
+/// through `center_ct_mm`), on the plane through `isocenter_point` parallel to each view's
+/// detector, and averaged over points and views (Sec. III-B2; docs/differences-from-the-paper.md
+/// says what the paper leaves open). nullopt when no point projects into a region.
 std::optional<ParameterScaling> projected_motion_scaling(const RigidTransform& room_from_ct,
                                                          const Eigen::Vector3d& center_ct_mm,
                                                          std::span<const Eigen::Vector3d> points_ct,
@@ -42,10 +42,10 @@ std::optional<ParameterScaling> projected_motion_scaling(const RigidTransform& r
                                                          const Eigen::Vector3d& isocenter_point);
 
 /// Six small motions (columns; rx, ry, rz about the room's axes through `center_ct_mm`, rad, then
-/// tx, ty, tz, mm), each of which moves the projections of the same points by 1 mm, root mean
-/// square over points and views, and independently of the others: the sum of their squared
-/// parameters is the mean squared displacement. One of them is nearly a translation along the beam
-/// where there is but one view. nullopt when no point projects into a region. \test
+/// tx, ty, tz, mm). Each moves the projections of the same points by 1 mm (root mean square over
+/// points and views), independently of the others: the sum of their squared parameters is the mean
+/// squared displacement. With a single view, one of them is nearly a translation along the beam.
+/// nullopt when no point projects into a region. \test
 /// ProjectedMotionBasis.MakesMotionsOfOneMillimetre
 std::optional<PoseMatrix> projected_motion_basis(const RigidTransform& room_from_ct,
                                                  const Eigen::Vector3d& center_ct_mm,
@@ -62,7 +62,7 @@ class PoseTarget final : public LeastSquaresTarget {
   std::optional<double> evaluate(const ScaledParameters& point) override;
   void evaluate_all(std::span<const ScaledParameters> points,
                     std::span<std::optional<double>> values) override;
-  /// As far as the objective's measures have what is asked for.
+  /// Gives what is asked for as far as the objective's measures have it.
   std::optional<TargetValue> evaluate_with_gradient(const ScaledParameters& point) override {
     return evaluate_with(point, Derivatives::Gradient);
   }
@@ -78,7 +78,7 @@ class PoseTarget final : public LeastSquaresTarget {
 
   [[nodiscard]] RigidTransform pose(const ScaledParameters& point) const;
   [[nodiscard]] std::int64_t drr_count() const { return drr_count_; }
-  /// Of the latest evaluation.
+  /// For the latest evaluation.
   [[nodiscard]] std::int64_t rays_outside() const { return rays_outside_; }
 
  private:

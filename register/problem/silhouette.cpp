@@ -10,8 +10,8 @@
 namespace af::registration {
 namespace {
 
-/// More of the DRR's largest value than the blur of a level and the quantisation of a field leave
-/// beside a body, less than the thinnest edge of a bone.
+/// Share of the DRR's largest value. It is more than the blur of a level and the quantisation of a
+/// field leave beside a body, and less than the thinnest edge of a bone.
 constexpr float kLeastShareOfLargest = 0.02f;
 
 /// Pixels as bytes with rows and columns.
@@ -35,7 +35,7 @@ void fill_disc(const Pixels& pixels,
                const Eigen::Vector2d& center_px,
                double radius_px,
                std::uint8_t value) {
-  // What lies so far outside touches no pixel; nor can it overflow below.
+  // What lies so far outside touches no pixel, and could overflow below.
   if (!center_px.allFinite() || (center_px.array() < -radius_px - 1.0).any() ||
       center_px.x() > pixels.width + radius_px || center_px.y() > pixels.height + radius_px)
     return;
@@ -54,7 +54,7 @@ void fill_disc(const Pixels& pixels,
 /// Gradients reach one pixel beyond a used one.
 constexpr int kBorderPx = 1;
 
-/// Where the cuts are seen in a view's region, in its pixels.
+/// Where the cuts appear in a view's region, in its pixels.
 std::vector<Eigen::Vector2d> cuts_in(const View& view,
                                      std::span<const Eigen::Vector3d> cut_points_ct,
                                      const RigidTransform& room_from_ct) {
@@ -66,7 +66,7 @@ std::vector<Eigen::Vector2d> cuts_in(const View& view,
   return cuts;
 }
 
-/// The reference within `region` of it, where `used` and its own mask allow.
+/// The part of the reference within `region`, where `used` and its own mask allow.
 SimilarityReference narrowed(const SimilarityReference& reference,
                              std::span<const std::uint8_t> used,
                              const RegionOfInterest& region) {
@@ -85,7 +85,7 @@ SimilarityReference narrowed(const SimilarityReference& reference,
   return result;
 }
 
-/// None when too little is seen.
+/// None when too little is visible.
 std::optional<ObjectiveView> narrowed_view(const SilhouetteView& view,
                                            std::span<const Eigen::Vector3d> cut_points_ct,
                                            const RigidTransform& room_from_ct) {
@@ -104,7 +104,7 @@ std::optional<ObjectiveView> narrowed_view(const SilhouetteView& view,
       whole.roi.column + region.column, whole.roi.row + region.row, region.width, region.height};
   try {
     narrow.measure = make_similarity(view.similarity, reference);
-  } catch (const InputError&) {  // no contrast that this measure could compare
+  } catch (const InputError&) {  // there is no contrast that this measure could compare
     return std::nullopt;
   }
   return narrow;

@@ -17,9 +17,9 @@ struct PixelRange {
   int count;
 };
 
-/// The pixels that an interval touches; pixel i reaches from i - 0.5 to i + 0.5.
+/// The pixels that an interval touches. Pixel i reaches from i - 0.5 to i + 0.5.
 PixelRange pixels_of(double low_px, double high_px) {
-  // Far beyond any detector, yet no overflow.
+  // This is far beyond any detector, and cannot overflow.
   const auto whole = [](double px) { return static_cast<int>(std::clamp(px, -1e6, 1e6)); };
   const int first = whole(std::floor(low_px + 0.5));
   return {first, std::max(1, whole(std::ceil(high_px + 0.5)) - first)};
@@ -44,7 +44,7 @@ PixelRange about_box(double low_px,
 
 /// A range that has moved by about `motion_px`.
 PixelRange moved(const PixelRange& range, double motion_px, int step_px, int size_px) {
-  // As far as its middle stays on the detector.
+  // It moves only as far as its middle stays on the detector.
   const int middle = range.first + range.count / 2;
   const double lowest = -step_px * (std::max(0, middle) / step_px);
   const double highest = step_px * (std::max(0, size_px - middle) / step_px);

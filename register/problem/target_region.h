@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Regions of interest that go where the target box is seen.
+// Regions of interest that follow the target box.
 #pragma once
 
 #include <optional>
@@ -15,33 +15,33 @@
 
 namespace af::registration {
 
-/// The rectangle on a detector about the projections of a box's corners, (column, row).
+/// The rectangle on a detector around the projections of a box's corners, (column, row).
 struct ProjectedBox {
   Eigen::Vector2d low_px;
   Eigen::Vector2d high_px;
 };
 
-/// None when a corner lies less than 1 mm before the source.
+/// None when a corner lies less than 1 mm in front of the source.
 std::optional<ProjectedBox> projected_box(const CtBox& box_ct,
                                           const RigidTransform& room_from_ct,
                                           const CameraGeometry& camera);
 
-/// RegistrationView::target_region where the target box is seen at the nominal pose as `box`: the
-/// region that the study states and what of the box it lacks; without one (`stated`: none), the box
-/// grown by a quarter of its sides to every side. When nobody stated the nominal pose, the place of
-/// the stated region beside the box means nothing: it is centred on the box.
+/// RegistrationView::target_region where the target box is seen at the nominal pose as `box`. It is
+/// the region that the study states, extended to hold the box. Without one (`stated`: none), it is
+/// the box grown by a quarter of its sides to every side. When nobody stated the nominal pose, the
+/// place of the stated region relative to the box means nothing, so it is centred on the box.
 /// \test TargetRegion.HoldsTheBoxAndKeepsTheMarginsOfTheStatedRegion
 RegionOfInterest target_region_about(const ProjectedBox& box,
                                      const std::optional<RegionOfInterest>& stated,
                                      bool is_nominal_stated);
 
 /// Where a view looks at a pose: its target_region, moved as the middle of the box's projection has
-/// moved since the nominal pose, by multiples of `step_px` along columns and rows; view.roi when it
-/// has none. It may reach beyond the detector: View::scaled() cuts it. Only the place follows: a
-/// box that turns by 10 degrees is seen up to a sixth wider, which the margins hold, and a region
-/// that keeps its size compares the same number of pixels everywhere. Its middle stays on the
-/// detector; it stays where it is at the nominal pose when a corner of the box lies behind the
-/// source. \test TargetRegion.FollowsTheBoxInEveryView
+/// moved since the nominal pose, by multiples of `step_px` along columns and rows. It is view.roi
+/// when there is no target_region. It may reach beyond the detector: View::scaled() cuts it. Only
+/// the place follows. A box that turns by 10 degrees is seen up to a sixth wider, which the margins
+/// hold, and a region that keeps its size compares the same number of pixels everywhere. Its middle
+/// stays on the detector. It stays where it is at the nominal pose when a corner of the box lies
+/// behind the source. \test TargetRegion.FollowsTheBoxInEveryView
 RegionOfInterest region_at(const RegistrationProblem& problem,
                            const RegistrationView& view,
                            const RigidTransform& room_from_ct,

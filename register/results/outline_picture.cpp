@@ -14,8 +14,8 @@ namespace af::registration {
 
 namespace {
 
-/// Whether the outlines of an image pass a pixel: its slope is the steepest across them, and among
-/// the steepest tenth of the image.
+/// Whether the outlines of an image pass through a pixel: its slope is the steepest across them,
+/// and among the steepest tenth of the image.
 Image2d outlines_of(const Image2d& image) {
   constexpr double kSmoothingPx = 1.0;
   constexpr double kShareOfFlatter = 0.85;
@@ -44,7 +44,7 @@ Image2d outlines_of(const Image2d& image) {
   return outlines;
 }
 
-/// The X-ray, where the outlines pass without a value, which pictures show in orange.
+/// The X-ray. It has no value where the outlines pass, which pictures show in orange.
 PicturePanel panel_of(const RegistrationView& view,
                       const RigidTransform& room_from_ct,
                       const std::string& title) {

@@ -10,8 +10,8 @@
 namespace af::registration {
 
 /// Picture of one view before and after a registration: the X-ray's region twice, with the outlines
-/// of the DRR at the start and at the found pose. The same outlines on the same anatomy are a pose
-/// that fits.
+/// of the DRR at the start and at the found pose. A pose fits when the outlines lie on the same
+/// anatomy.
 void write_outlines(const RegistrationView& view,
                     const RigidTransform& start_room_from_ct,
                     const RigidTransform& room_from_ct,

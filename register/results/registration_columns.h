@@ -16,7 +16,7 @@
 
 namespace af::registration {
 
-/// What every registrations.csv says of a registration. NaN: not known.
+/// What every registrations.csv says about a registration. NaN: unknown.
 struct RegistrationRow {
   static constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 
@@ -32,7 +32,7 @@ struct RegistrationRow {
   std::string stop_reason;
   std::int64_t inadmissible = 0;
   std::int64_t drr_count = 0;
-  std::string chain;    ///< of the method, whose end was taken; empty for other programs' poses
+  std::string chain;  ///< of the method, from which the end comes; empty for other programs' poses
   std::string verdict;  ///< empty where the end was not judged
   JudgeSummary judge = {{kMissing, kMissing}, {kMissing, kMissing}, kMissing, kMissing};
   UncertaintyReport uncertainty;
@@ -76,10 +76,10 @@ struct OwnCells {
   CsvCells behind_uncertainty = {};
 };
 
-/// A row in the order of the columns: the contract's, with a program's own between them.
+/// A row in the order of the columns: the common ones, with a program's own between them.
 CsvCells registration_cells(const RegistrationRow& row, const RowParts& parts, OwnCells own);
 
-/// What a correction adds before the time; empty cells where there was none.
+/// What a correction adds before the time. Cells are empty where there was none.
 CsvCells correction_cells(const std::optional<CorrectionReport>& correction);
 
 CsvCells judge_cells(const JudgeSummary& judge);

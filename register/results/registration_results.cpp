@@ -44,7 +44,8 @@ json trace_json(const std::vector<TraceRow>& trace) {
   return rows;
 }
 
-/// gain and offset that bring `from` to `to` by least squares; gain 0 when `from` is constant.
+/// The gain and offset that fit `from` to `to` by least squares. The gain is 0 when `from` is
+/// constant.
 std::array<double, 2> linear_fit(const Image2d& from, const Image2d& to) {
   const auto n = static_cast<double>(from.pixels.size());
   double sum_from = 0.0;
@@ -126,7 +127,7 @@ json views_json(const RegistrationRecord& record, const RegistrationProblem& pro
           {"cameras", views}};
 }
 
-/// Covariance as six rows; null what is not known.
+/// Covariance as six rows. null for unknown values.
 json uncertainty_json(const RegistrationRecord& record) {
   const UncertaintyReport& report = record.uncertainty;
   json covariance = nullptr;
@@ -269,8 +270,8 @@ CsvTable registrations_table(std::vector<RegistrationRecord> records,
 
 namespace {
 
-/// What pictures show of a view's region: all of it, or where the CT is a small body in it, the
-/// silhouette's box and a third of its size around it. In pixels of the region.
+/// What pictures show of a view's region, in pixels of the region. It is the whole region or, where
+/// the CT is a small body in it, the silhouette's box and a third of its size around it.
 RegionOfInterest shown_region(const Image2d& drr) {
   const std::vector<std::uint8_t> body = silhouette(drr, 0.0, {});
   const RegionOfInterest tight = region_of(body, drr.width, drr.height, 0);
@@ -280,8 +281,8 @@ RegionOfInterest shown_region(const Image2d& drr) {
   return wide.pixel_count() == 0 || 2 * wide.pixel_count() > whole.pixel_count() ? whole : wide;
 }
 
-/// Masked pixels, such as those beyond an aperture, become no brighter than the brightest others,
-/// so that these have all greys.
+/// Makes masked pixels, such as those beyond an aperture, no brighter than the brightest others, so
+/// that these get all greys.
 void tame_masked(const Image2d& mask, Image2d& xray) {
   float highest = -std::numeric_limits<float>::infinity();
   for (std::size_t i = 0; i < xray.pixels.size(); ++i)
@@ -290,7 +291,7 @@ void tame_masked(const Image2d& mask, Image2d& xray) {
     if (mask.pixels[i] == 0.0f) xray.pixels[i] = std::min(xray.pixels[i], highest);
 }
 
-/// The border of a silhouette: a line between each of its pixels and a neighbour that is not.
+/// The border of a silhouette: a line between each of its pixels and a neighbour outside.
 std::vector<PictureLine> outline(const Image2d& drr) {
   const std::vector<std::uint8_t> body = silhouette(drr, 0.0, {});
   const auto is_body = [&](int column, int row) {
@@ -373,7 +374,7 @@ void write_overlay(const RegistrationView& view,
 
 namespace {
 
-/// Removes an earlier run's pose files and writes the pose under names that say whether it was
+/// Removes an earlier run's pose files, and writes the pose under names that say whether it was
 /// found.
 void write_pose_files(const RegistrationRecord& record, const std::filesystem::path& folder) {
   for (const char* name : {"pose.toml", "result.tfm", "rejected-pose.toml"})
@@ -441,7 +442,7 @@ std::string write_run(const std::vector<RegistrationRecord>& records,
                       const RunDescription& run,
                       const std::filesystem::path& folder) {
   const RegistrationRecord& best = records[best_record(records)];
-  // From here on, results of an earlier run are incomplete.
+  // From here on, the results of an earlier run are incomplete.
   remove_output(folder / "result.json");
   std::ostringstream summary;
   const Judgement judgement = judgement_of(best);

@@ -18,9 +18,9 @@ struct RunDescription {
   std::string case_name;
   std::string renderer;  ///< "field" or "raycast"
   Provenance provenance;
-  nlohmann::json landmarks;  ///< what gave the start, with residuals; null: another start
-  nlohmann::json search;     ///< what a search found, with likenesses; null: no search
-  bool has_pictures = true;  ///< --no-pictures: neither overlays nor slicer/
+  nlohmann::json landmarks;  ///< what gave the start, with residuals; null for another start
+  nlohmann::json search;     ///< what a search found, with likenesses; null without a search
+  bool has_pictures = true;  ///< unset by --no-pictures: neither overlays nor slicer/
 };
 
 /// result.json: verdict, poses as 4x4 (`room_from_ct`, which read_pose() reads) and as six
@@ -31,41 +31,42 @@ nlohmann::json result_json(const RegistrationRecord& record,
                            const RegistrationProblem& problem,
                            const RunDescription& run);
 
-/// What a record says of itself into its row: all that needs no gold pose, without the poses.
+/// Writes a record into its row: everything that needs no gold pose, without the poses.
 void set_result(const RegistrationRecord& record, RegistrationRow& row);
 
-/// registrations.csv with the contract's columns, rows sorted by start index. Parameters are
-/// relative to the nominal pose, which the column `relative_to` says.
+/// registrations.csv, with rows sorted by start index. Parameters are relative to the nominal pose,
+/// as the column `relative_to` says.
 CsvTable registrations_table(std::vector<RegistrationRecord> records,
                              const RegistrationProblem& problem,
                              const RunDescription& run);
 
-/// Picture of one view at a pose: X-ray region, DRR (brought to the X-ray's scale by least
-/// squares), checkerboard of both, and their difference.
+/// Picture of one view at a pose: X-ray region, DRR (fitted to the X-ray's scale by least squares),
+/// checkerboard of both, and their difference.
 void write_overlay(const RegistrationView& view,
                    const RigidTransform& room_from_ct,
                    const std::string& heading,
                    const std::filesystem::path& path);
 
-/// result.json, pose.toml, result.tfm, VIEW-overlay.png and reproduce.sh in `folder`, result.json
-/// last: when it is there, all are. A result that is "not found" gets no result.tfm, and
-/// rejected-pose.toml instead of pose.toml, so that no script takes its pose for a result. Without
-/// pictures, an earlier run's overlays go. \test ResultFiles.WithoutPicturesNoneAreLeft
+/// Writes result.json, pose.toml, result.tfm, VIEW-overlay.png and reproduce.sh into `folder`.
+/// result.json comes last: when it exists, all do. A result that is "not found" gets no result.tfm,
+/// and rejected-pose.toml instead of pose.toml, so that no script takes its pose for a result.
+/// Without pictures, an earlier run's overlays are removed. \test
+/// ResultFiles.WithoutPicturesNoneAreLeft
 void write_result_files(const RegistrationRecord& record,
                         const RegistrationProblem& problem,
                         const RunDescription& run,
                         const std::filesystem::path& folder);
 
-/// What a whole run leaves in `folder`: the files of its best record, and registrations.csv before
-/// them when there were several starts. Returns the summary for the terminal.
+/// Writes what a whole run leaves in `folder`: registrations.csv if there were several starts, then
+/// the files of the best record. Returns the summary for the terminal.
 std::string write_run(const std::vector<RegistrationRecord>& records,
                       const RegistrationProblem& problem,
                       const RunDescription& run,
                       const std::filesystem::path& folder);
 
-/// Names of files that a run replaces in its folder, whatever the cameras' names.
+/// Names of files that a run replaces in its folder, independent of the cameras' names.
 std::vector<std::string> result_file_names();
-/// The pictures that it replaces, one per view.
+/// The pictures that a run replaces, one per view.
 std::vector<std::string> overlay_file_names(const RegistrationProblem& problem);
 
 }  // namespace af::registration

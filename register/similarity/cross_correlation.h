@@ -13,11 +13,11 @@ namespace af::registration {
 ///     NCC = sum (x - mean x)(d - mean d) / sqrt(sum (x - mean x)^2 sum (d - mean d)^2)
 ///
 /// over the used pixels, from -1 to 1; 0 when the DRR is constant there. With x^ and d^ the centred
-/// images of norm 1, NCC = 1 - |x^ - d^|^2 / 2: a sum of squares, whose normal equations gain and
-/// offset do not enter. \test CrossCorrelation.IsOneForAnyRisingLinearMap
+/// images of norm 1, NCC = 1 - |x^ - d^|^2 / 2. This is a sum of squares, in whose normal equations
+/// gain and offset do not enter. \test CrossCorrelation.IsOneForAnyRisingLinearMap
 class CrossCorrelation final : public DifferentiableMeasure, public LeastSquaresMeasure {
  public:
-  /// InputError when the reference has problems.
+  /// Throws InputError when the reference has problems.
   explicit CrossCorrelation(const SimilarityReference& reference);
 
   [[nodiscard]] double evaluate(std::span<const float> drr,

@@ -16,7 +16,7 @@ double DifferenceEntropy::evaluate(std::span<const float> drr,
   if (!difference_.take(drr, mine)) return std::numeric_limits<double>::quiet_NaN();
   std::fill(mine.counts.begin(), mine.counts.end(), 0U);
   const auto bins_per_unit = static_cast<float>(bins_ / (2.0 * difference_.xray_range()));
-  // No difference is the middle of a bin: rounding does not spread it over two.
+  // Zero difference is the middle of a bin, so that rounding does not spread it over two.
   const int middle_bin = bins_ / 2;
   const float middle = static_cast<float>(middle_bin) + 0.5f;
   const auto last = static_cast<float>(bins_ - 1);

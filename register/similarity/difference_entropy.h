@@ -11,11 +11,11 @@ namespace af::registration {
 ///
 ///     S = sum_k p_k log p_k   <= 0,
 ///
-/// over `bins` bins from minus to plus the X-ray's range; values beyond count in the outermost
+/// over `bins` bins from minus to plus the X-ray's range. Values beyond count in the outermost
 /// bins. \test SimilarityMeasures.ScaledXraysReachTheBestValue
 class DifferenceEntropy final : public SimilarityMeasure {
  public:
-  /// InputError when the reference has problems.
+  /// Throws InputError when the reference has problems.
   DifferenceEntropy(const SimilarityReference& reference, int bins);
 
   [[nodiscard]] double evaluate(std::span<const float> drr,

@@ -16,14 +16,14 @@ class DifferenceWorkspace final : public SimilarityWorkspace {
   std::vector<std::uint32_t> counts;
 };
 
-/// x - a d - b over the used pixels, with the gain a >= 0 and the offset b of least squares (Penney
-/// et al., IEEE TMI 17(4), 1998, search the gain).
+/// x - a d - b over the used pixels, with gain a >= 0 and offset b from least squares (Penney et
+/// al., IEEE TMI 17(4), 1998, search for the gain).
 class DifferenceImage {
  public:
-  /// InputError when the reference has problems.
+  /// Throws InputError when the reference has problems.
   explicit DifferenceImage(const SimilarityReference& reference);
 
-  /// Fills workspace.difference; unused pixels are 0. False when the DRR is not finite.
+  /// Fills workspace.difference, with 0 for unused pixels. False when the DRR is not finite.
   bool take(std::span<const float> drr, DifferenceWorkspace& workspace) const;
 
   [[nodiscard]] const std::vector<float>& weights() const { return weights_; }

@@ -14,7 +14,7 @@ namespace af::registration {
 /// \test GradientCorrelation.HardlyNoticesASlowRamp
 class GradientCorrelation final : public DifferentiableMeasure, public LeastSquaresMeasure {
  public:
-  /// InputError as GradientReference.
+  /// Throws InputError as GradientReference does.
   explicit GradientCorrelation(const SimilarityReference& reference);
 
   [[nodiscard]] double evaluate(std::span<const float> drr,

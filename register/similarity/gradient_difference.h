@@ -11,12 +11,12 @@ namespace af::registration {
 ///     GD = 1/2 [ mean A_c / (A_c + (x_c - a d_c)^2) + mean A_r / (A_r + (x_r - a d_r)^2) ]   in
 ///     (0, 1],
 ///
-/// with Sobel's derivatives along columns (c) and rows (r), A the variance of the X-ray's, and the
-/// gain a >= 0 of least squares (Penney et al. search it). \test
+/// with Sobel's derivatives along columns (c) and rows (r), the variance A of the X-ray's, and the
+/// gain a >= 0 from least squares (Penney et al. search for it). \test
 /// SimilarityMeasures.ScaledXraysReachTheBestValue
 class GradientDifference final : public SimilarityMeasure {
  public:
-  /// InputError as GradientReference, or when the X-ray has no gradient along an axis.
+  /// Throws InputError as GradientReference does, or when the X-ray has no gradient along an axis.
   explicit GradientDifference(const SimilarityReference& reference);
 
   [[nodiscard]] double evaluate(std::span<const float> drr,

@@ -43,7 +43,7 @@ GradientReference::GradientReference(const SimilarityReference& reference)
     throw InputError(
         "region of interest = no 3 x 3 pixels in use: gradient measures need some (mask, size)");
   Image2d image = reference.xray;
-  // What a mask hides may be anything, NaN too.
+  // What a mask hides may be anything, including NaN.
   for (std::size_t i = 0; i < image.pixels.size(); ++i)
     if (!reference.is_used(i)) image.pixels[i] = 0.0f;
   xray.resize(image.pixels.size());
@@ -91,8 +91,8 @@ void add_adjoint_gradient(const GradientReference& reference,
                           std::span<const float> by_gradient,
                           GradientWorkspace& workspace,
                           std::span<float> by_pixel) {
-  // Sobel's weights change sign when they are turned about, so the adjoint is minus the operator,
-  // over an image with a border of zeros.
+  // Sobel's weights change sign when they are rotated by half a turn. The adjoint is therefore
+  // minus the operator, over an image with a border of zeros.
   const int width = reference.width + 2;
   const int height = reference.height + 2;
   const auto row_pixels = static_cast<std::size_t>(reference.width);

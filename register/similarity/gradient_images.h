@@ -24,7 +24,7 @@ struct GradientPair {
 
 /// The X-ray's gradients, and where they can be trusted.
 struct GradientReference {
-  /// InputError when the reference has problems or is smaller than 3 x 3 pixels.
+  /// Throws InputError when the reference has problems or is smaller than 3 x 3 pixels.
   explicit GradientReference(const SimilarityReference& reference);
 
   int width = 0;
@@ -38,7 +38,7 @@ struct GradientReference {
 class GradientWorkspace final : public SimilarityWorkspace {
  public:
   GradientPair drr;
-  /// Gradients of the six derivative planes, [direction]; grown at the first use.
+  /// Gradients of the six derivative planes, [direction]. Allocated at the first use.
   std::array<std::vector<float>, 2> planes;
   std::vector<float> robust_weights;
   std::vector<float> curvature_weights;
@@ -60,15 +60,15 @@ void take_gradients(const GradientReference& reference,
                     std::span<const float> planes,
                     GradientWorkspace& workspace);
 
-/// Adds to `by_pixel` what derivatives by the gradients along columns (direction 0) or rows (1)
-/// mean for the image: the adjoint of Sobel's operator.
+/// Adds to `by_pixel` what derivatives with respect to the gradients along columns (direction 0) or
+/// rows (1) mean for the image: the adjoint of Sobel's operator.
 void add_adjoint_gradient(const GradientReference& reference,
                           int direction,
                           std::span<const float> by_gradient,
                           GradientWorkspace& workspace,
                           std::span<float> by_pixel);
 
-/// The gain a that makes the sum of (x - a d)^2 over both directions least; 0 when d is flat or the
+/// The gain a that minimises the sum of (x - a d)^2 over both directions. 0 when d is flat or the
 /// gain would be negative.
 double least_squares_gain(const GradientReference& reference, const GradientPair& drr);
 

@@ -10,12 +10,13 @@ namespace af::registration {
 ///     GO = 1/max(N, N_low) sum_i w(angle_i),   w(a) = (2 - ln(1 + |a|)) / 2
 ///
 /// over the N pixels where the gradients (Sobel) of both images are longer than the medians of
-/// their lengths; angle_i in rad between the two gradients, N_low half of the used pixels. At most
-/// 1. Only directions count: gain, offset and rising changes of contrast have no effect.
+/// their lengths. angle_i (rad) is the angle between the two gradients, N_low half of the used
+/// pixels. At most 1. Only directions count: gain, offset and rising changes of contrast have no
+/// effect.
 /// \test SimilarityMeasures.GainAndOffsetDoNotCountWhereTheyAreEliminated
 class GradientOrientation final : public SimilarityMeasure {
  public:
-  /// InputError as GradientReference.
+  /// Throws InputError as GradientReference does.
   explicit GradientOrientation(const SimilarityReference& reference);
 
   [[nodiscard]] double evaluate(std::span<const float> drr,

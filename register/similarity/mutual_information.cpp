@@ -43,7 +43,7 @@ std::array<float, 4> cubic_window(float t) {
           sixth * t * t * t};
 }
 
-/// Their derivatives by t.
+/// The derivatives of these weights with respect to t.
 std::array<float, 4> cubic_window_slopes(float t) {
   const float u = 1.0f - t;
   return {-0.5f * u * u, t * (1.5f * t - 2.0f), -u * (1.5f * u - 2.0f), 0.5f * t * t};
@@ -59,7 +59,7 @@ struct WindowPosition {
 WindowPosition window_position(float value, float low, float bins_per_unit, int bins) {
   const auto end = static_cast<float>(bins - 3);
   const float free = (value - low) * bins_per_unit;
-  // In this order of arguments a NaN becomes 0 instead of an undefined conversion.
+  // This order of arguments turns a NaN into 0, whose conversion would otherwise be undefined.
   const float position = std::min(std::max(0.0f, free), end);
   const auto bin = std::min(static_cast<std::int32_t>(position), bins - 4);
   return {static_cast<std::uint32_t>(bin),
@@ -105,7 +105,7 @@ JointHistogramMeasure::JointHistogramMeasure(const SimilarityReference& referenc
   for (std::size_t i = 0; i < pixels; ++i) {
     const double position = (static_cast<double>(reference.xray.pixels[i]) - range.low) /
                             (range.high - range.low) * bins;
-    // An unused pixel may hold anything, NaN too: its value is not looked at.
+    // An unused pixel may hold anything, including NaN, so its value is not looked at.
     const std::size_t row =
         reference.is_used(i)
             ? static_cast<std::size_t>(std::clamp(static_cast<int>(position), 0, bins - 1))
@@ -162,7 +162,8 @@ void JointHistogramMeasure::count_smoothly(std::span<const float> drr, Workspace
   for (std::size_t i = 0; i < drr.size(); ++i) {
     const WindowPosition at = window_position(drr[i], drr_low_, bins_per_unit_, bins_);
     const std::array<float, 4> window = cubic_window(at.t);
-    // Two histograms in turn: an addition need not wait for the neighbouring pixel's.
+    // Two histograms are used in turn, so that an addition need not wait for the neighbouring
+    // pixel's.
     float* const cell = mine.joint.data() + (i % 2) * cells + xray_rows_[i] + at.first_bin;
     for (std::size_t k = 0; k < 4; ++k) cell[k] += window[k];
   }
@@ -199,7 +200,7 @@ double JointHistogramMeasure::evaluate_with_derivative(std::span<const float> dr
         "DRR and derivative must have the size of the reference");
   auto& mine = dynamic_cast<Workspace&>(workspace);
   const EntropyScore score = this->score(smooth_entropies(drr, mine));
-  // dH/dd = sum_k -log p_k dp_k/dd: the windows' slopes add up to 0, so the "- 1" falls out.
+  // dH/dd = sum_k -log p_k dp_k/dd. The windows' slopes add up to 0, so the "- 1" drops out.
   const auto scale = static_cast<double>(bins_per_unit_) / used_pixels_;
   const auto by_joint = static_cast<float>(score.by_joint * scale);
   const auto by_drr = static_cast<float>(score.by_drr * scale);

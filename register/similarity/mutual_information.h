@@ -19,21 +19,22 @@ struct JointEntropies {
   double joint = 0.0;
 };
 
-/// A similarity computed from the entropies, and its derivatives by the DRR's and the joint one.
+/// A similarity computed from the entropies, and its derivatives with respect to the DRR's and the
+/// joint one.
 struct EntropyScore {
   double value = 0.0;
   double by_drr = 0.0;
   double by_joint = 0.0;
 };
 
-/// Base of the measures that look at the joint histogram of X-ray and DRR: `bins` x `bins` equal
-/// intervals. The X-ray's range is that of its used pixels, the DRR's is given; values beyond it
-/// count in the first or last bin.
+/// Base of the measures that use the joint histogram of X-ray and DRR, with `bins` x `bins` equal
+/// intervals. The X-ray's range is that of its used pixels, and the DRR's is given. Values beyond
+/// it count in the first or last bin.
 ///
 /// Plain: integer counts n_ij, -sum p log p = log N - sum f(n) / N with f(n) = n log n. Smooth: a
 /// DRR value counts in four bins by a cubic B-spline window (Thevenaz and Unser, IEEE TIP 9(12),
-/// 2000; Mattes et al., IEEE TMI 22(1), 2003), its range mapped to the bins that have a neighbour
-/// on one side and two on the other, which makes every score differentiable.
+/// 2000; Mattes et al., IEEE TMI 22(1), 2003). Its range is mapped to the bins that have a
+/// neighbour on one side and two on the other. Every score is then differentiable.
 class JointHistogramMeasure : public DifferentiableMeasure {
  public:
   [[nodiscard]] double evaluate(std::span<const float> drr,
@@ -44,7 +45,7 @@ class JointHistogramMeasure : public DifferentiableMeasure {
   [[nodiscard]] std::unique_ptr<SimilarityWorkspace> make_workspace() const override;
 
  protected:
-  /// InputError when the reference has problems.
+  /// Throws InputError when the reference has problems.
   JointHistogramMeasure(const SimilarityReference& reference, int bins, bool is_smooth);
 
   [[nodiscard]] virtual EntropyScore score(const JointEntropies& entropies) const = 0;
@@ -63,7 +64,7 @@ class JointHistogramMeasure : public DifferentiableMeasure {
                                           ///< histogram; unused pixels have a row of their own
   std::vector<double> n_log_n_;           ///< 0 ... used pixels
   double used_pixels_ = 0.0;
-  double xray_entropy_ = 0.0;  ///< which no pose changes
+  double xray_entropy_ = 0.0;  ///< no pose changes it
 };
 
 /// Mutual information, in nats, of X-ray and DRR from their joint histogram (Maes et al., IEEE TMI
@@ -74,7 +75,7 @@ class JointHistogramMeasure : public DifferentiableMeasure {
 /// \test MutualInformation.OfAnImageWithItselfIsItsEntropy
 class MutualInformation final : public JointHistogramMeasure {
  public:
-  /// InputError when the reference has problems. `is_smooth`: see JointHistogramMeasure.
+  /// Throws InputError when the reference has problems. `is_smooth`: see JointHistogramMeasure.
   MutualInformation(const SimilarityReference& reference, int bins, bool is_smooth = false)
       : JointHistogramMeasure(reference, bins, is_smooth) {}
 
@@ -93,7 +94,7 @@ class MutualInformation final : public JointHistogramMeasure {
 /// \test NormalizedMutualInformation.IsTwoForAnImageWithItself
 class NormalizedMutualInformation final : public JointHistogramMeasure {
  public:
-  /// InputError when the reference has problems. `is_smooth`: see JointHistogramMeasure.
+  /// Throws InputError when the reference has problems. `is_smooth`: see JointHistogramMeasure.
   NormalizedMutualInformation(const SimilarityReference& reference,
                               int bins,
                               bool is_smooth = false)

@@ -13,8 +13,8 @@ namespace {
 constexpr int kRadiusPx = 3;
 constexpr double kScaleOverRange = 10.0 / 256.0;
 
-/// Adds up the pairs (i, i + shift) for all shifts of half the disc: each pair once. Rows are
-/// taken singly so that no pair wraps around the image's edge.
+/// Adds up the pairs (i, i + shift) for all shifts of half the disc, so that each pair counts once.
+/// Rows are taken one by one, so that no pair wraps around the image's edge.
 PairSums pairs_of(float squared_scale,
                   std::span<const float> difference,
                   std::span<const float> weights,

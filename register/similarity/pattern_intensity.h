@@ -15,7 +15,7 @@ namespace af::registration {
 /// must be used. \test SimilarityMeasures.ScaledXraysReachTheBestValue
 class PatternIntensity final : public SimilarityMeasure {
  public:
-  /// InputError when the reference has problems or no pair of used pixels is near enough.
+  /// Throws InputError when the reference has problems, or no pair of used pixels is near enough.
   explicit PatternIntensity(const SimilarityReference& reference);
 
   [[nodiscard]] double evaluate(std::span<const float> drr,

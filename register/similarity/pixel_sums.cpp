@@ -10,8 +10,8 @@
 namespace af::registration {
 namespace {
 
-/// A constant image leaves rounding errors of this order in its variance: products are rounded to
-/// single precision.
+/// A constant image leaves rounding errors of this order in its variance, because products are
+/// rounded to single precision.
 constexpr double kRelativeRounding = 1e-6;
 
 /// Place of the product of channels a <= b in the upper triangle.

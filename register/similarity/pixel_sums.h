@@ -25,7 +25,7 @@ inline constexpr int kDrrChannel = 6;
 inline constexpr int kXrayChannel = 7;
 
 /// Gram sums of six planes (`plane_pixels` apart), a DRR and an X-ray over a block that begins at
-/// pixel `first`; `weights` empty: 1 everywhere.
+/// pixel `first`. Empty `weights`: 1 everywhere.
 GramSums gram_sums(std::span<const float> planes,
                    std::span<const float> drr,
                    std::span<const float> xray,
@@ -44,22 +44,22 @@ GramSums gram_sums(std::span<const float> planes,
 /// Sum of the products of two channels.
 double gram_product(const GramSums& sums, int a, int b);
 
-/// Sum of the products of two channels less their means.
+/// Sum of the products of two channels after their means are subtracted.
 double centered_gram_product(const GramSums& sums, int a, int b);
 
 /// Correlation of DRR and X-ray as 1 - |x^ - d^|^2 / 2 of the centred images divided by their
-/// norms; 0, with no gradient, where the sum of squares of the centred DRR is below
+/// norms. It is 0, without gradient, where the sum of squares of the centred DRR is below
 /// `smallest_square`.
 NormalEquations correlation_normal_equations(const GramSums& sums, double smallest_square);
 
 /// The same, but 0 where correlate() gives 0: where the DRR is constant up to rounding.
 NormalEquations correlation_normal_equations(const GramSums& sums);
 
-/// 1 where a pixel counts, 0 elsewhere; empty when all do.
+/// 1 where a pixel counts, 0 elsewhere. Empty when all do.
 std::vector<float> pixel_weights(const SimilarityReference& reference);
 
-/// Centres an image over the pixels of weight 1 and divides it by its norm there; 0 elsewhere. An
-/// image that is constant there becomes 0.
+/// Centres an image over the pixels of weight 1 and divides it by its norm there. It is 0
+/// elsewhere. An image that is constant there becomes 0.
 std::vector<float> unit_image(std::span<const float> image, std::span<const float> weights);
 
 /// Sum of the weights, or `pixels` when there are none.
@@ -72,14 +72,14 @@ struct UnitCorrelation {
   double norm = 0.0;  ///< of the centred image; 0 when it is constant
 };
 
-/// Over the pixels of weight 1 (none given: all).
+/// Over the pixels of weight 1, or all if no weights are given.
 UnitCorrelation correlate(std::span<const float> image,
                           std::span<const float> unit_reference,
                           std::span<const float> weights,
                           double used_pixels,
                           double offset);
 
-/// Derivative of the correlation by every pixel of the image.
+/// Derivative of the correlation with respect to every pixel of the image.
 void correlation_derivative(const UnitCorrelation& correlation,
                             std::span<const float> image,
                             std::span<const float> unit_reference,

@@ -10,9 +10,10 @@ using namespace af::AF_KERNEL_NAMESPACE::native;
 
 namespace {
 
-/// Lanes of a sum, at every vector width.
+/// Lanes of a sum, the same for every vector width.
 constexpr int kSumLanes = 16;
-/// Groups of so many lanes that are summed in single precision before their sum goes on in double.
+/// How many groups of this many lanes are summed in single precision before their sum moves to
+/// double.
 constexpr int kGroupsPerFlush = 64;
 constexpr int kParts = kSumLanes / kLanes;
 
@@ -69,8 +70,8 @@ AF_KERNEL_INLINE double total(const LaneSums<N>& sums, int i) {
   return sum;
 }
 
-/// N sums over pixels; add(at, left, recent) adds those of the kLanes pixels from `at` on, `left`
-/// of which there are, to running sums. The order of additions does not depend on the vector width.
+/// N sums over pixels. add(at, left, recent) adds those of the kLanes pixels from `at` on, `left`
+/// of which exist, to running sums. The order of additions does not depend on the vector width.
 template <uint32_t N, typename Add>
 AF_KERNEL_INLINE LaneSums<N> sum_pixels(int32_t count, const Add& add) {
   LaneSums<N> sums;
@@ -229,14 +230,15 @@ void count_histogram(const HistogramRequest& request, int32_t count) {
   for (; i + kLanes <= count; i += kLanes) {
     const Floats position =
         (load(request.drr + i) - splat(request.low)) * splat(request.bins_per_unit);
-    // In this order of arguments a NaN becomes bin 0 instead of an undefined conversion.
+    // This order of arguments turns a NaN into bin 0, whose conversion would otherwise be
+    // undefined.
     const Floats clamped = minimum(maximum(position, splat(0.0f)), splat(request.last_bin));
     Ints row_offsets;
     memcpy(&row_offsets, request.row_offsets + i, sizeof(row_offsets));
     int32_t cell[kLanes];
     store(cell, to_int(clamped) + row_offsets);
     // Neighbouring pixels tend to fall into the same cell. They are counted into several histograms
-    // in turn, so that no increment waits for the one before it.
+    // in turn, so that no increment waits for the previous one.
 #pragma GCC unroll 16
     for (int lane = 0; lane < kLanes; ++lane)
       ++counts[cell[lane] + lane % kHistogramCopies * request.cells];

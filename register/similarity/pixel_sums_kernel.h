@@ -30,15 +30,15 @@ struct GramSums {
   double weight;
 };
 
-/// What a correlation needs of a DRR d: sums of w d, w d d and w x d.
+/// What a correlation needs from a DRR d: sums of w d, w d d and w x d.
 struct CorrelationSums {
   double value;
   double square;
   double product;
 };
 
-/// Sums over residuals r = x - gain d with q = w (s / (s + r r))^2, s the squared scale: q x d, q d
-/// d, and the saturating cost w r r / (s + r r) (Geman, McClure).
+/// Sums over residuals r = x - gain d with q = w (s / (s + r r))^2, where s is the squared scale: q
+/// x d, q d d, and the saturating cost w r r / (s + r r) (Geman, McClure).
 struct RobustSums {
   double product;
   double square;
@@ -67,7 +67,7 @@ struct HistogramRequest {
 };
 inline constexpr int kHistogramCopies = 4;
 
-/// Sum over used pixel pairs of s / (s + (e_i - e_{i + shift})^2), e = x - gain d.
+/// Sum over used pixel pairs of s / (s + (e_i - e_{i + shift})^2), where e = x - gain d.
 struct PairRequest {
   const float* difference;
   const float* weights;

@@ -23,8 +23,8 @@ double median_gradient(const GradientReference& reference) {
   return *middle;
 }
 
-/// Products of the six derivatives after the gain has followed them: without their parts along the
-/// DRR.
+/// Products of the six derivatives after the gain has followed them, which removes their parts
+/// along the DRR.
 PoseMatrix without_gain(const GramSums& sums) {
   const double square = gram_product(sums, kDrrChannel, kDrrChannel);
   PoseMatrix products;
@@ -105,7 +105,7 @@ double RobustGradient::evaluate_with_derivative(std::span<const float> drr,
   const double gain = gain_of(mine.drr);
   mine.derivative.resize(drr.size());
   std::fill(derivative.begin(), derivative.end(), 0.0f);
-  // d rho / d r = 2 q r / s^2 with q = (s^2 / (s^2 + r^2))^2; the gain is at its best, so its own
+  // d rho / d r = 2 q r / s^2 with q = (s^2 / (s^2 + r^2))^2. The gain is at its best, so its own
   // change does not count.
   const auto scale = static_cast<float>(2.0 * gain / (squared_scale_ * cost_without_drr_));
   const auto single_gain = static_cast<float>(gain);

@@ -11,17 +11,17 @@ namespace af::registration {
 ///     RG = 1 - sum rho(x_i - a d_i) / sum rho(x_i),   rho(r) = r^2 / (s^2 + r^2),
 ///
 /// over Sobel's derivatives along columns and rows at the used pixels. The gain a >= 0 of the view
-/// is eliminated: from least squares, refined by a fixed number of reweighted steps. A perfect DRR
-/// has 1, no DRR at all (a = 0) has 0, and the contribution of occluders, which a DRR cannot show,
-/// is bounded. s = `residual_scale` times the median length of the X-ray's gradients.
+/// is eliminated: it comes from least squares, refined by a fixed number of reweighted steps. A
+/// perfect DRR has 1, and no DRR at all (a = 0) has 0. The contribution of occluders, which a DRR
+/// cannot show, is bounded. s = `residual_scale` times the median length of the X-ray's gradients.
 ///
 /// Its normal equations take the weights as constant. With rho'' in place of rho' / r they become
-/// the curvature (after the gain has followed, but for a term that vanishes with the gradient).
+/// the curvature (after the gain has followed, except for a term that vanishes with the gradient).
 /// \test RobustGradient.OccludersCostABoundedPrice,
 /// RobustGradient.CurvesLessThanItsNormalEquationsByTheReweighting
 class RobustGradient final : public DifferentiableMeasure, public LeastSquaresMeasure {
  public:
-  /// InputError as GradientReference, or when most of the X-ray has no gradient.
+  /// Throws InputError as GradientReference does, or when most of the X-ray has no gradient.
   RobustGradient(const SimilarityReference& reference, double residual_scale);
 
   [[nodiscard]] double evaluate(std::span<const float> drr,
@@ -38,7 +38,7 @@ class RobustGradient final : public DifferentiableMeasure, public LeastSquaresMe
   [[nodiscard]] RobustSums sums_at(const GradientPair& drr, double gain) const;
   [[nodiscard]] double gain_of(const GradientPair& drr) const;
   /// Fills workspace.robust_weights and .curvature_weights with the weights of one direction, and
-  /// gives its part of the cost.
+  /// returns its part of the cost.
   double take_weights(int direction, double gain, GradientWorkspace& workspace) const;
 
   GradientReference reference_;

@@ -73,7 +73,7 @@ std::unique_ptr<RobustGradient> robust(const SimilarityOptions& options,
   return std::make_unique<RobustGradient>(reference, options.residual_scale);
 }
 
-/// The row of a maker, whose return type says what the measure can do.
+/// The row of a maker. Its return type says what the measure can do.
 template <auto make>
 constexpr KnownMeasure row(const char* name, const char* help) {
   using Measure = typename std::invoke_result_t<decltype(make),
@@ -87,7 +87,7 @@ constexpr KnownMeasure row(const char* name, const char* help) {
               -> std::unique_ptr<SimilarityMeasure> { return make(options, reference); }};
 }
 
-/// A new measure joins here.
+/// Every measure. A new one is added here.
 constexpr std::array kMeasures = {
     row<histogram<MutualInformation>>("mi", "mutual information"),
     row<histogram<NormalizedMutualInformation>>("nmi", "normalised mutual information"),

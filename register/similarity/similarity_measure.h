@@ -29,11 +29,11 @@ struct SimilarityReference {
   [[nodiscard]] bool is_used(std::size_t pixel) const { return used.empty() || used[pixel] != 0; }
 };
 
-/// Why a reference cannot be compared with anything: empty, mask of another size, no pixel used,
-/// constant or non-finite values, empty DRR range; empty when it can.
+/// Why a reference cannot be compared with anything: it is empty, its mask has another size, no
+/// pixel is used, values are constant or not finite, or the DRR range is empty. Empty when it can.
 std::vector<std::string> problems(const SimilarityReference& reference);
 
-/// Scratch memory of one thread; made by the measure it is used with.
+/// Scratch memory of one thread, made by the measure that uses it.
 class SimilarityWorkspace {
  public:
   virtual ~SimilarityWorkspace() = default;
@@ -44,10 +44,10 @@ using PoseVector = Eigen::Matrix<double, 6, 1>;
 using PoseMatrix = Eigen::Matrix<double, 6, 6>;
 
 /// A similarity near a pose, as Gauss and Newton see it: S(p + h) ~ value + gradient h - h' matrix
-/// h / 2 with the residuals taken as linear in h and their weights as constant, so that `matrix` is
-/// positive semi-definite. Where residuals count the less the larger they are, S curves less, as
-/// `matrix` - `reweighting` says, which may bend upwards. Left out are second derivatives of the
-/// DRR, and a term of the eliminated gain that vanishes with the gradient.
+/// h / 2. Residuals are taken as linear in h and their weights as constant, so that `matrix` is
+/// positive semi-definite. Where larger residuals count less, S curves less, as `matrix` -
+/// `reweighting` says, which may bend upwards. Second derivatives of the DRR are left out, and so
+/// is a term of the eliminated gain that vanishes with the gradient.
 struct NormalEquations {
   double value = 0.0;
   PoseVector gradient = PoseVector::Zero();
@@ -57,10 +57,10 @@ struct NormalEquations {
   NormalEquations& operator+=(const NormalEquations& other);
 };
 
-/// Similarity of one view's DRR to its X-ray; higher is more alike. Holds all that can be computed
-/// from the X-ray beforehand. Calls are const and re-entrant with one workspace per thread; their
-/// values depend on nothing but their arguments. Several views are summed by MultiViewObjective
-/// (eq. (13)).
+/// Similarity of one view's DRR to its X-ray; higher is more alike. Holds everything that can be
+/// computed from the X-ray beforehand. Calls are const, and re-entrant with one workspace per
+/// thread. Their values depend only on their arguments. MultiViewObjective sums several views (eq.
+/// (13)).
 class SimilarityMeasure {
  public:
   virtual ~SimilarityMeasure() = default;
@@ -69,34 +69,35 @@ class SimilarityMeasure {
   [[nodiscard]] virtual double evaluate(std::span<const float> drr,
                                         SimilarityWorkspace& workspace) const = 0;
 
-  /// Without memory, for measures that need none.
+  /// Has no memory, for measures that need none.
   [[nodiscard]] virtual std::unique_ptr<SimilarityWorkspace> make_workspace() const;
 };
 
-/// A measure that a DRR pixel changes smoothly.
+/// A measure that changes smoothly with every DRR pixel.
 class DifferentiableMeasure : public virtual SimilarityMeasure {
  public:
-  /// The value, and in `derivative` (as many pixels) its derivative by every DRR pixel. The value
-  /// is evaluate()'s up to rounding.
+  /// Returns the value, which is evaluate()'s up to rounding. `derivative` (as many pixels)
+  /// receives its derivative with respect to every DRR pixel.
   virtual double evaluate_with_derivative(std::span<const float> drr,
                                           std::span<float> derivative,
                                           SimilarityWorkspace& workspace) const = 0;
 };
 
-/// A sum of squared residuals. It may lack a derivative by every pixel.
+/// A sum of squared residuals. It may lack a derivative with respect to every pixel.
 class LeastSquaresMeasure : public virtual SimilarityMeasure {
  public:
-  /// `planes`: derivatives of every DRR pixel by six parameters, six planes one after the other.
+  /// `planes`: derivatives of every DRR pixel with respect to six parameters, six planes one after
+  /// the other.
   [[nodiscard]] virtual NormalEquations normal_equations(std::span<const float> drr,
                                                          std::span<const float> planes,
                                                          SimilarityWorkspace& workspace) const = 0;
 };
 
 struct SimilarityOptions {
-  std::string name = "mi";  ///< of the stages of `paper`; those of chains state theirs
+  std::string name = "mi";  ///< for the stages of `paper`; those of chains state theirs
   int bins = 64;
-  /// mi, nmi: DRR values are counted through cubic B-spline windows, which makes the measure
-  /// differentiable; optimisers that need derivatives set it.
+  /// For mi and nmi: DRR values are counted through cubic B-spline windows, which makes the measure
+  /// differentiable. Optimisers that need derivatives set it.
   bool has_smooth_histogram = false;
   double residual_scale = 1.0;
   int tiles = 4;
@@ -104,11 +105,11 @@ struct SimilarityOptions {
   void describe(Fields& field);
 };
 
-/// One problem, that lists the known names, or none.
+/// One problem that lists the known names, or none.
 std::vector<std::string> similarity_name_problems(const std::string& name);
 std::vector<std::string> problems(const SimilarityOptions& options);
 
-/// What is known of a measure before it has a reference. Its maker's type says what it can do.
+/// What is known of a measure before it has a reference. The type of its maker says what it can do.
 struct KnownMeasure {
   const char* name;
   const char* help;
@@ -117,16 +118,16 @@ struct KnownMeasure {
   std::unique_ptr<SimilarityMeasure> (*make)(const SimilarityOptions& options,
                                              const SimilarityReference& reference);
 };
-/// Every measure there is.
+/// Every measure.
 std::span<const KnownMeasure> known_measures();
-/// InputError that lists the known names.
+/// The measure of that name. Throws InputError that lists the known names.
 const KnownMeasure& known_measure(const std::string& name);
 
 /// Names that make_similarity() knows, and one line that explains them.
 std::vector<std::string> similarity_names();
 std::string similarity_help();
 
-/// InputError when the options or the reference have problems.
+/// Throws InputError when the options or the reference have problems.
 std::unique_ptr<SimilarityMeasure> make_similarity(const SimilarityOptions& options,
                                                    const SimilarityReference& reference);
 

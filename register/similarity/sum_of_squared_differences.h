@@ -10,7 +10,7 @@
 namespace af::registration {
 
 /// Sum of squared differences as a similarity (Hill et al., Phys. Med. Biol. 46(3), 2001, Sec.
-/// 4.2.2): the negative mean over the n used pixels, best value 0,
+/// 4.2.2). It is the negative mean over the n used pixels, with best value 0:
 ///
 ///     SSD = -1/n sum (x - d)^2.
 ///
@@ -18,7 +18,7 @@ namespace af::registration {
 /// \test SumOfSquaredDifferences.OfAShiftedImageIsMinusTheSquaredShift
 class SumOfSquaredDifferences final : public DifferentiableMeasure, public LeastSquaresMeasure {
  public:
-  /// InputError when the reference has problems.
+  /// Throws InputError when the reference has problems.
   explicit SumOfSquaredDifferences(const SimilarityReference& reference);
 
   [[nodiscard]] double evaluate(std::span<const float> drr,

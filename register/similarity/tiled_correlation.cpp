@@ -8,8 +8,8 @@
 namespace af::registration {
 namespace {
 
-/// A DRR tile whose standard deviation is below this share of the DRR range correlates by rounding
-/// and quantisation only.
+/// A DRR tile whose standard deviation is below this share of the DRR range correlates only by
+/// rounding and quantisation.
 constexpr double kFlatShareOfRange = 1e-3;
 constexpr double kSmallestUsedShare = 0.25;
 

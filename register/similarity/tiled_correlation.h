@@ -9,17 +9,18 @@
 
 namespace af::registration {
 
-/// Cross correlation tile by tile, weighted by the X-ray's contrast (in the spirit of the variance
-/// weighted sum of local correlations of LaRose, PhD thesis, Carnegie Mellon University, 2001):
+/// Cross correlation tile by tile, weighted by the X-ray's contrast (in the spirit of the
+/// variance-weighted sum of local correlations of LaRose, PhD thesis, Carnegie Mellon University,
+/// 2001):
 ///
 ///     TNCC = sum_T w_T NCC_T,   w_T = |x - mean_T x|_T / sum of these over tiles
 ///
-/// The region is cut into tiles x tiles; tiles with less than a quarter of their pixels in use are
-/// left out. Shading, a heel effect or a bright rod disturb only the tiles that they cross.
+/// The region is cut into tiles x tiles. Tiles with less than a quarter of their pixels in use are
+/// left out. Shading, a heel effect or a bright rod disturbs only the tiles that it crosses.
 /// \test TiledCorrelation.IgnoresAnOffsetAndAGainOfItsOwnInEveryTile
 class TiledCorrelation final : public LeastSquaresMeasure {
  public:
-  /// InputError when the reference has problems or no tile is left.
+  /// Throws InputError when the reference has problems, or no tile is left.
   TiledCorrelation(const SimilarityReference& reference, int tiles);
 
   [[nodiscard]] double evaluate(std::span<const float> drr,

@@ -8,18 +8,18 @@
 namespace af::registration {
 namespace {
 
-/// The share of the X-rays' gradients that a pose explains in detail, mean over the views, from
-/// which on it explains them well.
+/// A pose explains the X-rays well from this share of their gradients on, in detail, averaged over
+/// the views.
 constexpr double kExplainedShare = 0.65;
 
-/// exp(at_once + growth x): x is by how much the logarithm of the share falls short of that of
+/// exp(at_once + growth x), where x is how far the logarithm of the share falls short of that of
 /// kExplainedShare.
 struct Inflation {
   double at_once;
   double growth;
 };
 
-/// What a pose is judged by: constants are of one kind each.
+/// The kinds of evidence about a pose. Each has constants of its own.
 enum class Evidence { Views, OneView, Silhouettes };
 
 struct InflationRow {
@@ -29,10 +29,10 @@ struct InflationRow {
   Inflation tre;
 };
 
-/// By `jobs/uncertainty.py --folds`, on patients 1001 to 1060 (a902ce97; docs/uncertainty.md).
-/// Within silhouettes on drawn bones of odd numbers (44ed6cd2), of which the pose explains nearly
-/// all: their growth is that over regions. The last row is for what was not fitted: more cautious
-/// than all of them.
+/// Fitted by `jobs/uncertainty.py --folds` to patients 1001 to 1060 (a902ce97;
+/// docs/uncertainty.md). The row within silhouettes was fitted to drawn bones of odd numbers
+/// (44ed6cd2). The pose explains nearly all of these, so their growth is that over regions. The
+/// last row is for what was not fitted, and more cautious than all others.
 constexpr std::array kInflation = {
     InflationRow{"rg", Evidence::Views, {0.41, 1.75}, {-0.08, 0.90}},
     InflationRow{"gc", Evidence::Views, {0.00, 1.90}, {-0.60, 0.85}},
@@ -44,7 +44,7 @@ constexpr std::array kInflation = {
     InflationRow{"", Evidence::Views, {2.50, 8.00}, {2.50, 8.00}},
 };
 
-/// Of the samples' spacing; see interpolation_shift_mm() and docs/uncertainty.md.
+/// Share of the samples' spacing. See interpolation_shift_mm() and docs/uncertainty.md.
 constexpr double kShiftPerSpacing = 0.02;
 
 /// The coefficients of a logistic regression on two features.
@@ -54,20 +54,20 @@ struct Confidence {
   double by_second;
 };
 
-/// Of success_confidence(), likewise, to the ends of `robust` and `fast`.
+/// For success_confidence(), likewise fitted, to the ends of `robust` and `fast`.
 constexpr Confidence kOverRegions{-3.10, 51.13, -1.08};
-/// Of one view, by its excess and the logarithm of that excess's part of the share: a predicted TRE
+/// For one view, by its excess and the logarithm of the excess's part of the share. A predicted TRE
 /// says how little one view shows of depth, not whether the place is right.
 constexpr Confidence kOneView{-1.10, 48.14, 3.81};
-/// Of drawn bones of odd numbers (44ed6cd2), with the logarithm of the excess.
+/// For drawn bones of odd numbers (44ed6cd2), with the logarithm of the excess.
 constexpr Confidence kInSilhouettes{0.62, 4.23, -3.68};
-/// A smaller excess counts as this one there: a view that shows nothing leaves no confidence.
+/// Smaller excesses count as this one there: a view that shows nothing leaves no confidence.
 constexpr double kLeastExcess = 0.02;
 
 /// Smaller shares are treated as this one.
 constexpr double kLeastShare = 0.05;
 /// Predicted TREs are clamped to this range, so that a small one does not stand for what X-rays do
-/// not show; a missing one counts as the farthest.
+/// not show. A missing one counts as the farthest.
 constexpr double kNearMm = 0.1;
 constexpr double kFarMm = 20.0;
 

@@ -16,7 +16,7 @@ constexpr double kNormalHalfWidth95 = 1.959963984540054;
 
 using MotionMatrix = Eigen::Matrix<double, 3, 6>;
 
-/// How a point at `arm` from the centre moves by small (rx, ry, rz, tx, ty, tz).
+/// How small (rx, ry, rz, tx, ty, tz) move a point at `arm` from the centre.
 MotionMatrix motion_of(const Eigen::Vector3d& arm) {
   MotionMatrix motion = MotionMatrix::Zero();
   for (int k = 0; k < 3; ++k) {
@@ -26,7 +26,7 @@ MotionMatrix motion_of(const Eigen::Vector3d& arm) {
   return motion;
 }
 
-/// 1 for mm, degrees per radian for the rotations.
+/// 1 for mm, and degrees per radian for the rotations.
 PoseVector units() {
   PoseVector result = PoseVector::Ones();
   result.head<3>().setConstant(kDegPerRad);

@@ -13,8 +13,8 @@
 namespace af::registration {
 namespace {
 
-/// Robust gradients are of no use within silhouettes: the grain of the bone and of the detector,
-/// which counts there like an edge, hides what the bone's edges explain.
+/// Robust gradients are of no use within silhouettes. There the grain of the bone and of the
+/// detector counts like an edge, and hides what the bone's edges explain.
 StageOptions silhouette_stage(double silhouette_mm) {
   StageOptions stage;
   stage.similarity.name = "gc";
@@ -28,8 +28,8 @@ StageOptions silhouette_stage(double silhouette_mm) {
 constexpr std::size_t kCoarse = 0;
 constexpr std::size_t kFine = 1;
 
-/// Two stages, to be evaluated only: the judge's at the coarsest level that the view has up to its
-/// own, and at level 0.
+/// Two stages that are only evaluated: the judge's, at the coarsest level that the view has up to
+/// the judge's own, and one at level 0.
 std::array<StageOptions, 2> judging_stages(const RegistrationView& view, double silhouette_mm) {
   StageOptions stage = silhouette_mm > 0.0 ? silhouette_stage(silhouette_mm) : JudgeOptions().stage;
   stage.optimizer = "gauss-newton";
@@ -41,7 +41,7 @@ std::array<StageOptions, 2> judging_stages(const RegistrationView& view, double 
 
 }  // namespace
 
-/// None when the X-ray has no gradients over most of the region: the measure refuses it.
+/// None when the measure refuses the X-ray, because it has no gradients over most of the region.
 std::optional<PoseExaminer::JudgedView> PoseExaminer::judged_view(
     const RegistrationProblem& problem, std::size_t view, double silhouette_mm) {
   const RegistrationView& judged = problem.views[view];
@@ -94,7 +94,7 @@ std::vector<ViewValue> PoseExaminer::view_values(const RigidTransform& room_from
     if (!view) continue;
     value.coarse = share_of(view->stages[kCoarse].value_at(*problem_, room_from_ct));
     value.fine = share_of(view->stages[kFine].value_at(*problem_, room_from_ct));
-    // Where the pose cannot be valued, the stage looks somewhere else.
+    // Where the pose has no value, the stage looks somewhere else.
     if (!with_backgrounds || !std::isfinite(value.fine)) continue;
     for (const double part : {1.0, 0.5, 0.25}) {
       value.background = share_beside(room_from_ct, part * kBackgroundDistanceMm, *view);

@@ -15,7 +15,7 @@ PoseVector sum_of(const TileScores& scores) {
   return sum;
 }
 
-/// The views' gradients beside the origin of `frame`, after a small motion; empty where that is
+/// The views' gradients at a small motion from the origin of `frame`. Empty where that is
 /// inadmissible.
 std::vector<PoseVector> gradients_beside(MultiViewObjective& objective,
                                          const PoseFrame& frame,
@@ -32,7 +32,7 @@ std::vector<PoseVector> gradients_beside(MultiViewObjective& objective,
   return gradients;
 }
 
-/// Of the projected motion along a direction of the basis.
+/// Step (mm) of the projected motion along a direction of the basis.
 double step_mm(const PoseVector& direction) {
   const double turn_rad = direction.head<3>().norm();
   const double move_mm = direction.tail<3>().norm();

@@ -9,47 +9,49 @@
 
 namespace af::registration {
 
-/// What the objective of a registration says about a pose that maximises it. Matrices are of small
-/// motions (rx, ry, rz, tx, ty, tz) of the CT in the room about the frame's centre, per rad and mm.
+/// What the objective of a registration says about a pose that maximises it. Matrices refer to
+/// small motions (rx, ry, rz, tx, ty, tz) of the CT in the room about the frame's centre, per rad
+/// and mm.
 struct PoseInformation {
   PoseMatrix curvature = PoseMatrix::Zero();  ///< negative Hessian, made positive definite
-  /// Sum over tiles of score score', score being the tile's share of the gradient: the gradient's
-  /// variance when what the DRRs do not explain is independent from tile to tile.
+  /// Sum over tiles of score score', where score is the tile's share of the gradient. It is the
+  /// gradient's variance if what the DRRs do not explain is independent from tile to tile.
   PoseMatrix scatter = PoseMatrix::Zero();
   std::vector<PoseMatrix> view_curvatures;  ///< their sum is `curvature` before it was bent
 };
 
-/// The information at the origin of `frame`. Curvature by central differences of the gradient over
-/// kInformationStepMm of projected motion (`basis`, of projected_motion_basis()) to both sides,
-/// less where that would be far, or to one where the other is inadmissible; 13 evaluations. nullopt
-/// where neither is admissible. The measures must have derivatives. Along the room's axes instead,
-/// depth would be the difference of motions that X-rays show a thousand times better, where there
-/// is one view. \test PoseInformation.OfAQuadraticObjectiveIsItsHessian
+/// The information at the origin of `frame`. Curvature comes from central differences of the
+/// gradient over kInformationStepMm of projected motion (along `basis`, from
+/// projected_motion_basis()) to both sides. The step is shorter where that would be far, and
+/// one-sided where the other side is inadmissible. Takes 13 evaluations. nullopt where neither side
+/// is admissible. The measures must have derivatives.
+/// Along the room's axes instead, depth with one view would be the difference of motions that
+/// X-rays show a thousand times better. \test PoseInformation.OfAQuadraticObjectiveIsItsHessian
 std::optional<PoseInformation> information_at(MultiViewObjective& objective,
                                               const PoseFrame& frame,
                                               const PoseMatrix& basis,
                                               int tiles);
 
-/// Long enough to average over a field's nodes, short beside the way over which curvatures change.
+/// Long enough to average over a field's nodes, and short compared with the way over which
+/// curvatures change.
 inline constexpr double kInformationStepMm = 0.2;
 
-/// Motions that hardly move projections, as depth does with one view of a small object, stay as
-/// small as this.
+/// Limits motions that hardly move projections, as depth with one view of a small object.
 inline constexpr double kLongestInformationMoveMm = 8.0;
 inline constexpr double kLargestInformationTurnRad = 0.05;
 
-/// Curvatures below this share of the largest, per squared projected motion, are raised to it:
-/// differences cannot tell them from zero or from an upward bend.
+/// Curvatures below this share of the largest, per squared projected motion, are raised to it,
+/// because differences cannot tell them from zero or from an upward bend.
 inline constexpr double kLeastRelativeCurvature = 1e-2;
 
 /// What DRRs do not explain changes the gradient by its scatter over about this much projected
-/// motion: a smaller curvature drowns in that. Right poses of clean X-rays bend by
-/// kDrownedCurvature of the largest or more in all directions, so no more than that is raised.
+/// motion, in which a smaller curvature drowns. Right poses of clean X-rays bend by
+/// kDrownedCurvature of the largest or more in all directions, so nothing is raised above that.
 inline constexpr double kScatterLengthMm = 1.0;
 inline constexpr double kDrownedCurvature = 0.05;
 
 /// The matrix with its eigenvalues in `basis` no less than kLeastRelativeCurvature of the largest,
-/// nor than what drowns in `scatter`; zero where the largest is not positive.
+/// and no less than what drowns in `scatter`. Zero where the largest is not positive.
 /// \test BentCurvature.KeepsDirectionsThatAreKnown \test BentCurvature.RaisesWhatDrownsInScatter
 PoseMatrix bent_curvature(const PoseMatrix& curvature,
                           const PoseMatrix& basis,

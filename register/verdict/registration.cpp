@@ -20,10 +20,10 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// About 512 of the points: enough to scale steps.
+/// About 512 of the points, which is enough to scale steps.
 std::vector<Eigen::Vector3d> some_points(const std::vector<Eigen::Vector3d>& points) {
   constexpr std::size_t kPoints = 512;
-  // Odd, so that it walks through all rows and layers of an even lattice.
+  // An odd stride walks through all rows and layers of an even lattice.
   const std::size_t stride = std::max<std::size_t>(1, points.size() / kPoints) | 1;
   std::vector<Eigen::Vector3d> some;
   for (std::size_t i = 0; i < points.size(); i += stride) some.push_back(points[i]);
@@ -44,9 +44,9 @@ struct PortfolioEnd : ChainEnd {
   const ChainOptions* chain = nullptr;
 };
 
-/// Ends that are worth at least this share of the best one to the judge, and lie farther than this
-/// from every better one, are finished, too. The judge looks coarsely: it preferred wrong ends by
-/// up to 5 % where the finish gave right ones values that were a third higher. The finish errs,
+/// An end is also finished if it is worth at least this share of the best one to the judge, and
+/// lies farther than this from every better one. The judge looks coarsely: it preferred wrong ends
+/// by up to 5 % where the finish gave right ones values that were a third higher. The finish errs
 /// too: at 0.8 it chose ends of a real skull that were worth 0.82 (docs/robust-tuning.md).
 /// \test Registration.TheFinishChoosesAmongEndsThatTheJudgeHardlyTellsApart
 constexpr double kRivalShare = 0.9;
@@ -76,7 +76,7 @@ class ReusedImages {
   MultiViewObjective& objective_;
 };
 
-/// The mean over the views of what a portfolio's judge says of a pose.
+/// The value that a portfolio's judge gives a pose, averaged over the views.
 ObjectiveValue value_of_judge(PreparedStage& judge,
                               const RegistrationProblem& problem,
                               const RigidTransform& room_from_ct) {
@@ -95,11 +95,11 @@ std::optional<ParameterScaling> scaling_at(const RegistrationProblem& problem,
                                   problem.isocenter_point);
 }
 
-/// Differences over this many mm to both sides average over a field's nodes, yet are small beside
-/// the way over which curvatures change.
+/// Differences over this many mm to both sides average over a field's nodes, but are small compared
+/// with the way over which curvatures change.
 constexpr double kCurvatureStepMm = 0.2;
 
-/// What the problem lacks that a correction needs.
+/// What a correction needs and the problem lacks.
 std::vector<std::string> correction_problems(const RegistrationProblem& problem,
                                              const RegistrationOptions& options) {
   std::vector<std::string> found;
@@ -120,60 +120,61 @@ struct Run {
   const RegistrationOptions& options;
   std::vector<PreparedStage>& stages;
   std::optional<PreparedStage>& judge;
-  OptimizerResult& search;  ///< of the stage that was searched last
+  OptimizerResult& search;  ///< of the last stage that was searched
   std::int64_t start_index = 0;
   RigidTransform start;                      ///< within the motion range
-  std::optional<ParameterScaling> at_start;  ///< by some of the points, there
+  std::optional<ParameterScaling> at_start;  ///< from some of the points, at the start
   RegistrationResult result;
 
   /// The scaling with which a stage searches from a pose.
   [[nodiscard]] std::optional<ParameterScaling> scaling_of(
       const PreparedStage& stage, const RigidTransform& room_from_ct) const;
   [[nodiscard]] std::uint64_t random_key(std::size_t index) const;
-  /// Runs the stages of a chain, the first of which is `first`, from `end`; false when one of them
+  /// Runs the stages of a chain, the first of which is `first`, from `end`. False when one of them
   /// did not converge.
   bool run_chain(const ChainOptions& chain, std::size_t first, ChainEnd& end);
-  /// Searches one stage from `end`; false when it did not converge. `index`: in the trace,
-  /// and a key of random numbers.
+  /// Searches one stage from `end`. False when it did not converge. `index` is its place in the
+  /// trace, and a key of random numbers.
   bool run_stage(PreparedStage& stage, std::size_t index, ChainEnd& end);
-  /// Of the search that ended last, "" when it is not pinned.
+  /// Where the search that ended last is pinned, "" when it is not.
   [[nodiscard]] std::string pinned_along(const PoseTarget& target,
                                          const PreparedStage& stage) const;
-  /// Places a stage at its start; false, and why in `end`, when it cannot.
+  /// Places a stage at its start. False when it cannot, and `end` says why.
   [[nodiscard]] bool place_at_start(PreparedStage& stage, ChainEnd& end);
-  /// Makes the similarities of ends of several starts comparable: evaluates an end within its own
-  /// regions and silhouettes and without reused images.
+  /// Evaluates an end within its own regions and silhouettes and without reused images, so that
+  /// similarities of ends of several starts can be compared.
   void take_own_similarity(ChainEnd& end);
-  /// Runs the chains and judges their ends: those that have a value, the best one first.
+  /// Runs the chains and judges their ends. Returns those that have a value, the best one first.
   std::vector<PortfolioEnd> portfolio_ends();
-  /// Whether the best of these ends, which is the first, ends the portfolio.
+  /// Whether the best of these ends, which comes first, ends the portfolio.
   [[nodiscard]] bool is_convincing(std::span<const PortfolioEnd> ends) const {
     return ends.front().similarity >= options.judge.enough_value;
   }
-  /// From an end to the nearest one of another chain that `counts`, mean over the target box; NaN
-  /// without any.
+  /// Distance from an end to the nearest one of another chain that `counts`, averaged over the
+  /// target box. NaN without any.
   template <typename Counts>
   [[nodiscard]] double nearest_mm(const PortfolioEnd& end,
                                   std::span<const PortfolioEnd> others,
                                   const Counts& counts) const;
-  /// Whether end `i`, behind the better ones, is to be finished, too.
+  /// Whether end `i`, behind the better ones, should be finished too.
   [[nodiscard]] bool is_rival(std::span<const PortfolioEnd> ends, std::size_t i) const;
-  /// The finish from an end; its similarity is NaN when nothing was searched.
+  /// Finishes an end. The similarity is NaN when nothing was searched.
   PortfolioEnd finished(PortfolioEnd end);
-  /// The finish from the best end and, unless that convinces, from its rivals; the finish's own
-  /// value chooses among those that converged.
+  /// Finishes the best end and, unless that is convincing, its rivals. The finish's own value
+  /// chooses among those that converged.
   PortfolioEnd finished_best(std::span<const PortfolioEnd> ends);
-  /// One chain, and its finish.
+  /// Runs one chain, and its finish.
   void run_alone();
-  /// Several chains, the choice among their ends, and its finish.
+  /// Runs several chains, the choice among their ends, and its finish.
   void run_portfolio();
-  /// The finish, from `end`.
+  /// Runs the finish from `end`.
   void run_finish(ChainEnd& end) {
     run_chain(options.finish, stages.size() - options.finish.stages.size(), end);
   }
-  /// The correction, from an end that converged.
+  /// Runs the correction from an end that converged.
   void correct(ChainEnd& end);
-  /// Searches the end's last stage with ray-cast DRRs, into `search`; the pose that it found.
+  /// Searches the end's last stage with ray-cast DRRs, into `search`. Returns the pose that it
+  /// found.
   ChainEnd search_by_casting(const ParameterScaling& scaling,
                              const SearchBudget& budget,
                              const ChainEnd& end);
@@ -220,7 +221,7 @@ bool Run::run_stage(PreparedStage& stage, std::size_t index, ChainEnd& end) {
       stage.objective, PoseFrame::about(end.room_from_ct, problem.center_ct_mm), *scaling);
   const SearchBudget budget{options.max_evaluations - result.evaluations, random_key(index)};
   {
-    // Searches along derivatives take short steps; others try poses all around.
+    // Searches along derivatives take short steps, while others try poses all around.
     const ReusedImages reused(stage.objective, stage.optimizer->needs() != Derivatives::None);
     stage.optimizer->maximize(target, stage.options.search, budget, search);
   }
@@ -243,7 +244,7 @@ bool Run::run_chain(const ChainOptions& chain, std::size_t first, ChainEnd& end)
   for (std::size_t i = 0; i < chain.stages.size(); ++i) {
     end.stage = first + i;
     if (run_stage(stages[end.stage], end.stage, end)) continue;
-    // The previous stage ended at the limit, and rounding put its end beyond.
+    // The previous stage ended at the limit, and rounding put its end beyond it.
     if (i > 0 && end.stop_reason == StopReason::StartInadmissible)
       end.stop_reason = StopReason::PinnedAtLimit;
     return false;
@@ -322,7 +323,8 @@ void Run::correct(ChainEnd& end) {
   if (budget.max_evaluations <= 0) return;
   const ChainEnd found = search_by_casting(*scaling, budget, end);
   report.casts = search.evaluations;
-  // By look-up, as for ends that are not corrected; this also checks that the fields hold the pose.
+  // The value comes from look-up, as for ends that are not corrected. This also checks that the
+  // fields hold the pose.
   const ObjectiveValue value = stages[end.stage].objective.evaluate(found.room_from_ct);
   result.drr_count += value.drr_count;
   if (!std::isfinite(found.similarity) || !value.is_admissible) return;
@@ -358,7 +360,7 @@ std::vector<PortfolioEnd> Run::portfolio_ends() {
     end.chain = &chain;
     const int evaluations_before = result.evaluations;
     run_chain(chain, begin, end);
-    // Where nothing was searched, the start is no end.
+    // Where nothing was searched, the start is not an end.
     if (result.evaluations > evaluations_before) end.similarity = judged(end.room_from_ct);
     if (std::isfinite(end.similarity)) {
       const auto worse = std::find_if(ends.begin(), ends.end(), [&](const PortfolioEnd& other) {
@@ -502,7 +504,7 @@ Registration::Registration(std::shared_ptr<const RegistrationProblem> of_problem
 void Registration::examine_ends(const UncertaintyOptions& options,
                                 const std::shared_ptr<ThreadPool>& threads) {
   uncertainty.emplace(problem, method, options, threads);
-  // Within silhouettes the CT is the target.
+  // Within silhouettes the CT itself is the target.
   if (method.silhouette_mm() == 0.0) target_examiner.emplace(problem, threads);
   examiner.emplace(problem, method.silhouette_mm());
 }
@@ -534,7 +536,7 @@ RegistrationResult Registration::search(const RigidTransform& start_room_from_ct
   return std::move(run.result);
 }
 
-/// Only of an end that an agreeing target makes found: it takes as long as a registration.
+/// Only for an end that an agreeing target makes found, because it takes as long as a registration.
 void Registration::ask_target(RegistrationRecord& record) {
   const double without_target = record.uncertainty.confidence;
   record.uncertainty.confidence = confidence_if_target_agrees(without_target);
@@ -589,7 +591,7 @@ Judgement judgement_of(const RegistrationRecord& record) {
   Judgement judgement = failure.has_value()
                             ? Judgement{Verdict::NotFound, *failure}
                             : judged_confidence(record.uncertainty, record.view_values);
-  // Whatever leaves a doubt, however high the confidence is, belongs to these.
+  // These include whatever leaves a doubt, however high the confidence is.
   std::vector<std::string> reasons = record.diagnosis.messages;
   if (!failure.has_value())
     for (const std::string& doubt :

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A registration, whole: what af-register, af-evaluate and the library do from a start to what is
-// said of its end.
+// A whole registration: what af-register, af-evaluate and the library do from a start to the
+// judgement of its end.
 #pragma once
 
 #include <cstdint>
@@ -34,54 +34,54 @@ struct RivalEnd {
   double share = 0.0;     ///< of the end's similarity
 };
 
-/// One registration, and what is said of its end.
+/// One registration, and what is said about its end.
 struct RegistrationRecord {
   std::int64_t start_index = 0;
   RegistrationResult result;
-  std::vector<ViewValue> view_values;  ///< of PoseExaminer, at the end
-  UncertaintyReport uncertainty;       ///< of UncertaintyEstimator, likewise
-  ViewDiagnosis diagnosis;             ///< where X-rays were looked into: Registration::diagnose()
+  std::vector<ViewValue> view_values;  ///< from PoseExaminer, at the end
+  UncertaintyReport uncertainty;       ///< from UncertaintyEstimator, likewise
+  ViewDiagnosis diagnosis;             ///< if X-rays were looked into: Registration::diagnose()
   std::optional<TargetErrors> errors;  ///< when the gold pose is known
   std::optional<RivalEnd> rival;       ///< where starts were searched: see set_rival()
 
-  /// What the registration itself found; the rest is derived from it.
+  /// What the registration itself found. The rest is derived from it.
   auto members() { return std::tie(start_index, result, view_values, uncertainty); }
 };
 
 /// Registers one case from any number of starts. Construction does what all starts share (smoothed
-/// and decimated references, histograms' ranges, X-ray bins); runs reuse the buffers. One run at a
-/// time spreads over the threads of a pool: views, and poses that do not depend on each other. Runs
-/// at the same time need a registration each. A result depends on problem, method and start alone
-/// (its seconds excepted), not on the number of threads. The DRR range of a case is that of the DRR
-/// at the nominal pose over the study's region grown by half its size to every side. \test
+/// and decimated references, histograms' ranges, X-ray bins), and runs reuse the buffers. One run
+/// at a time spreads over the threads of a pool: views, and independent poses. Concurrent runs need
+/// a registration each. A result depends only on problem, method and start (except its seconds),
+/// not on the number of threads. The DRR range of a case is that of the DRR at the nominal pose
+/// over the study's region grown by half its size to every side. \test
 /// Registration.TwoViewsRecoverAKnownPose
 class Registration {
  public:
-  /// InputError when method or problem have problems, or when the nominal pose is outside a field.
-  /// `threads`: none means the calling thread alone.
+  /// Throws InputError when method or problem have problems, or when the nominal pose is outside a
+  /// field. Without `threads` only the calling thread works.
   Registration(std::shared_ptr<const RegistrationProblem> of_problem,
                const RegistrationOptions& by_method,
                const std::shared_ptr<ThreadPool>& threads = nullptr);
 
-  /// Lets run() examine ends: else records have neither view_values nor uncertainty.
+  /// Makes run() examine ends. Otherwise records have neither view_values nor uncertainty.
   void examine_ends(const UncertaintyOptions& options,
                     const std::shared_ptr<ThreadPool>& threads = nullptr);
 
-  /// Lets run_everywhere() look for starts. InputError as of PoseSearch.
+  /// Makes run_everywhere() possible. Throws InputError as PoseSearch does.
   void look_for_starts(const PoseSearchOptions& options,
                        const std::shared_ptr<ThreadPool>& threads = nullptr);
 
-  // The parts, in the order in which a start meets them. They are made for each other: read them,
-  // but assign none.
+  // The parts, in the order in which a start meets them. They are made for each other, so read them
+  // but do not assign to them.
 
   std::shared_ptr<const RegistrationProblem> problem;  ///< X-rays, cameras, renderers
   RegistrationOptions method;                          ///< chains of stages, finish, judge
-  /// Of all chains and the finish, in this order: each an objective (renderers and measures of its
-  /// views) and the optimiser that searches it.
+  /// Stages of all chains and then of the finish. Each is an objective (renderers and measures of
+  /// its views) and the optimiser that searches it.
   std::vector<PreparedStage> stages;
   std::optional<PreparedStage> judge;               ///< chooses among the ends of a portfolio
   std::optional<PoseExaminer> examiner;             ///< values the end view by view
-  std::optional<TargetExaminer> target_examiner;    ///< asks the target of an end that is found
+  std::optional<TargetExaminer> target_examiner;    ///< asks the target about an end that is found
   std::optional<UncertaintyEstimator> uncertainty;  ///< how far the end may be from the truth
   std::optional<PoseSearch> pose_search;            ///< finds starts where none is known
 
@@ -89,13 +89,13 @@ class Registration {
   /// finish, the correction. `start_index` is a key of random numbers.
   [[nodiscard]] RegistrationResult search(const RigidTransform& start_room_from_ct,
                                           std::int64_t start_index = 0);
-  /// search(), and what examiner and uncertainty say of its end.
+  /// search(), and what examiner and uncertainty say about its end.
   [[nodiscard]] RegistrationRecord run(const RigidTransform& start_room_from_ct,
                                        std::int64_t start_index = 0);
-  /// run() from every pose that the search finds; the best record, with its rival and the seconds
-  /// of all.
+  /// run() from every pose that the search finds. Returns the best record, with its rival and the
+  /// seconds of everything.
   [[nodiscard]] RegistrationRecord run_everywhere(std::int64_t start_index = 0);
-  /// Looks into X-rays that do not fit the end of a record of run() (ViewDiagnoser).
+  /// Looks into X-rays that do not fit the end of a record from run() (ViewDiagnoser).
   void diagnose(RegistrationRecord& record);
 
   /// The value of RegistrationResult::similarity at a pose.
@@ -109,13 +109,13 @@ class Registration {
   ViewDiagnoser diagnoser_;
 };
 
-/// The verdict on a record by its confidence (judged_confidence()); not found where the search
-/// found nothing, at least doubtful where something else leaves a doubt. The reason names all of
-/// it, and tells of a clipped start.
+/// The verdict on a record by its confidence (judged_confidence()). It is not found where the
+/// search found nothing, and at least doubtful where something else leaves a doubt. The reason
+/// names all of it, and mentions a clipped start.
 Judgement judgement_of(const RegistrationRecord& record);
 
-/// Order of records by similarity, highest first; those that are not found come after the others,
-/// those without a similarity last, ties go by start index.
+/// Order of records by similarity, highest first. Those that are not found come after the others,
+/// those without a similarity last. Ties go by start index.
 bool is_better(const RegistrationRecord& a, const RegistrationRecord& b);
 
 /// Index of the best record; `records` is not empty.

@@ -18,16 +18,17 @@
 namespace af::registration {
 namespace {
 
-/// About the target's shadow, at the isocentre: room for a target that has moved.
+/// Margin around the target's shadow, at the isocentre: room for a target that has moved.
 constexpr double kMarginMm = 5.0;
-/// Of a side of the pixels to compare, there.
+/// Side of the pixels to compare, likewise.
 constexpr double kPixelMm = 1.5;
-/// Level 0 would see every node of a field.
+/// At level 0 every node of a field would show.
 constexpr int kLevel = 1;
-/// A target that has not moved takes three; one that shows little may wander.
+/// A target that has not moved takes three. One that shows little may wander.
 constexpr int kMostEvaluations = 50;
 
-/// Of the target's shadow at a pose, with its margin, on the detector; none where that is empty.
+/// The region of the target's shadow at a pose, with its margin, on the detector. None where it is
+/// empty.
 std::optional<RegionOfInterest> shadow_of(const CtBox& box_ct,
                                           const CameraGeometry& camera,
                                           const RigidTransform& room_from_ct,
@@ -46,7 +47,7 @@ std::optional<RegionOfInterest> shadow_of(const CtBox& box_ct,
 /// The target as the only body that moves, seen in its shadow.
 struct TargetAlone {
   RegistrationProblem problem;
-  std::vector<std::shared_ptr<PartMotionDrr>> drrs;  ///< of the views
+  std::vector<std::shared_ptr<PartMotionDrr>> drrs;  ///< one per view
   StageOptions stage;
 };
 
@@ -115,7 +116,7 @@ double across_mm(const RegistrationProblem& problem,
   return most_mm;
 }
 
-/// What the stage makes of the rest alone: the target where no view sees it.
+/// The stage's value for the rest alone, with the target where no view sees it.
 double value_without_target(MultiViewObjective& objective, const RigidTransform& room_from_ct) {
   constexpr double kOutOfSightMm = 1e5;
   const CameraGeometry& camera = objective.views().front().view.camera;

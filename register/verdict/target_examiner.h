@@ -14,28 +14,28 @@
 
 namespace af::registration {
 
-/// Where the target fits by itself.
+/// Where the target alone fits.
 struct TargetAnswer {
   double share;  ///< TargetEvidence::share
   RigidTransform room_from_ct;
 };
 
-/// Asks the target of a case about poses: DRRs in which it alone moves (PartMotionDrr) are compared
-/// with the X-rays about its shadow, by the measure of portfolios' judge. It tells a pose that fits
-/// everything but a bone that has moved. For one thread at a time.
+/// Asks the target of a case about poses. DRRs in which only it moves (PartMotionDrr) are compared
+/// with the X-rays around its shadow, by the measure of portfolios' judge. This recognises a pose
+/// that fits everything except a bone that has moved. For one thread at a time.
 ///
-/// Ends of many starts lie within micrometres of each other, so the rest is held at the nearest
-/// pose of a lattice (0.1 mm, 0.001 rad), and the target is registered once for each of these. What
-/// is said of a pose depends on that pose alone. \test
+/// Ends of many starts lie within micrometres of each other. The rest is therefore held at the
+/// nearest pose of a lattice (0.1 mm, 0.001 rad), and the target is registered once for each of
+/// these. The evidence on a pose depends on that pose alone. \test
 /// TargetExaminer.TellsHowFarTheTargetMovedAgainstTheRest
 class TargetExaminer {
  public:
-  /// `threads`: none means the calling thread alone.
+  /// Without `threads` only the calling thread works.
   explicit TargetExaminer(std::shared_ptr<const RegistrationProblem> problem,
                           std::shared_ptr<ThreadPool> threads = nullptr);
 
-  /// Nothing where a view has no target_casts or does not see the target, where its X-ray shows no
-  /// gradients there, and where a field does not hold the pose.
+  /// No evidence where a view has no target_casts or does not see the target, where its X-ray shows
+  /// no gradients there, and where a field does not hold the pose.
   [[nodiscard]] TargetEvidence evidence(const RigidTransform& room_from_ct);
 
  private:

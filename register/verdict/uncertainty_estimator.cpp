@@ -16,11 +16,11 @@
 namespace af::registration {
 namespace {
 
-/// Along each axis of a region: wide enough that what a DRR does not explain hardly reaches across,
-/// and enough of them to estimate six variances.
+/// Number along each axis of a region. Tiles must be wide enough that what a DRR does not explain
+/// hardly reaches across, and numerous enough to estimate six variances.
 constexpr int kTiles = 8;
 
-/// The stage as the curvature needs it: with derivatives, and with an optimiser that they suit.
+/// The stage as the curvature needs it: with derivatives, and with an optimiser that suits them.
 /// Robust gradients are of no use within silhouettes (see PoseExaminer).
 StageOptions differentiable(StageOptions stage) {
   if (!known_measure(stage.similarity.name).is_differentiable)
@@ -66,8 +66,8 @@ UncertaintyEstimator::UncertaintyEstimator(std::shared_ptr<const RegistrationPro
   try {
     ends_ = prepared_stages(*problem_, problem_->views, ends, pool);
   } catch (const InputError&) {
-    // rg, which replaces measures without derivative, rejects X-rays without gradients over most of
-    // the region; the registration's own measure may accept them.
+    // rg replaces measures without derivative, and rejects X-rays without gradients over most of
+    // the region. The registration's own measure may accept them.
   }
 }
 
@@ -98,7 +98,7 @@ double UncertaintyEstimator::add_covariance(const RegistrationResult& result,
                                             problem_->isocenter_point);
   if (!basis.has_value()) return UncertaintyReport::kNone;
   const std::size_t stage = stage_of_chain_.at(result.chain);
-  // Values over the region say nothing of what silhouettes show, and the other way round.
+  // Values over the region say nothing about what silhouettes show, and vice versa.
   const bool in_silhouette = ends_[stage].options.silhouette_mm > 0.0;
   const auto is_of_the_stage = [&](const ViewValue& value) {
     return value.in_silhouette == in_silhouette;
@@ -108,7 +108,7 @@ double UncertaintyEstimator::add_covariance(const RegistrationResult& result,
   auto information = information_at(ends_[stage].objective, frame, *basis, kTiles);
   if (!information.has_value()) return UncertaintyReport::kNone;
   const auto flat_sandwich = sandwich_covariance(*information);
-  // Along its beam one view may really be that flat.
+  // One view may really be that flat along its beam.
   if (views.size() > 1)
     information->curvature = bent_curvature(information->curvature, *basis, information->scatter);
   const auto sandwich = sandwich_covariance(*information);

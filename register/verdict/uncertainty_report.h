@@ -10,28 +10,28 @@
 
 namespace af::registration {
 
-/// What a registration says of its own error. Numbers alone: millions are held in memory. NaN where
-/// it cannot be said.
+/// What a registration says about its own error. It holds only numbers, because millions are kept
+/// in memory. NaN where it cannot be said.
 struct UncertaintyReport {
   static constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   static constexpr std::size_t kCovarianceSize = 21;
 
-  /// Upper triangle, row by row, of the covariance of (rx, ry, rz, tx, ty, tz) in deg and mm: the
+  /// Upper triangle, row by row, of the covariance of (rx, ry, rz, tx, ty, tz) in deg and mm. The
   /// true pose is the found pose followed by x_room -> p + t + Rz Ry Rx (x_room - p), about the
   /// room's axes, where p is the ROI centre at the found pose.
   std::array<double, kCovarianceSize> covariance_deg_mm = filled_with_nan();
   double tre_rms_mm = kNone;  ///< the root of the expected mean squared TRE over the target box
-  double sandwich_tre_mm = kNone;  ///< rms, of the sandwich alone: what the confidence looks at
+  double sandwich_tre_mm = kNone;  ///< rms, from the sandwich alone; the confidence uses it
   double tre_95_mm = kNone;        ///< the TRE is below this with probability 0.95
-  /// With one view: the target's centre lies within this, to either side, along the beam with
-  /// probability 0.95.
+  /// With one view: the target's centre lies within this distance, to either side, along the beam
+  /// with probability 0.95.
   double depth_95_mm = kNone;
-  TargetEvidence target;         ///< of an end that is found if its target agrees
+  TargetEvidence target;         ///< for an end that is found if its target agrees
   double inflation = kNone;      ///< what calibration multiplied the sandwich by for the covariance
-  double tre_inflation = kNone;  ///< and for the TREs
-  /// Probability that the registration succeeded (success_confidence(); with a target that agrees,
-  /// confidence_if_target_agrees()); a lower bound where tre_rms_mm is NaN, 0 where there is no
-  /// end.
+  double tre_inflation = kNone;  ///< likewise for the TREs
+  /// Probability that the registration succeeded (success_confidence(), or
+  /// confidence_if_target_agrees() with a target that agrees). It is a lower bound where tre_rms_mm
+  /// is NaN, and 0 where there is no end.
   double confidence = kNone;
 
   auto members() {

@@ -35,7 +35,8 @@ std::string length_text(double mm) {
          " mm";
 }
 
-/// Beyond this a target disagrees with its surroundings, by how much of the X-rays is explained.
+/// Beyond this distance a target disagrees with its surroundings. It depends on how much of the
+/// X-rays is explained.
 double apart_limit_mm(std::span<const ViewValue> values) {
   const double explained = std::clamp(summary_of(values, &ViewValue::coarse).mean, 0.0, 1.0);
   return std::min(kMostTargetApartMm,
@@ -111,7 +112,7 @@ Judgement judged_confidence(const UncertaintyReport& report, std::span<const Vie
             "how probably it is right is not known: no X-ray has gradients to judge the pose by, "
             "or the field holds no pose beside it to compare with"};
   const bool has_one_view = values.size() == 1;
-  // The confidence of one view looks at no TRE. 0: there is no end.
+  // The confidence of one view uses no TRE. 0: there is no end.
   const bool needs_tre = !has_one_view || values.front().in_silhouette;
   const bool is_bound = needs_tre && !std::isfinite(report.tre_rms_mm) && report.confidence > 0.0;
   const std::string right = std::string("right with ") + (is_bound ? "at least " : "") +

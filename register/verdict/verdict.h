@@ -20,18 +20,18 @@ namespace af::registration {
 enum class Verdict { Found, Doubtful, NotFound };
 inline constexpr std::array kVerdicts{Verdict::Found, Verdict::Doubtful, Verdict::NotFound};
 
-/// "found", "doubtful", "not found": as in result files.
+/// The names in result files: "found", "doubtful", "not found".
 const char* to_string(Verdict verdict);
 
-/// A verdict and why, in words.
+/// A verdict, and its reason in words.
 struct Judgement {
   Verdict verdict = Verdict::NotFound;
   std::string reason;
 };
 
-/// How much of an X-ray's gradients, over twice the region, the DRR at a pose explains, at the
-/// judge's coarse level and at the renderer's own: 0 as without a DRR, 1 all, NaN where it cannot
-/// be judged.
+/// How much of an X-ray's gradients the DRR at a pose explains, over twice the region, at the
+/// judge's coarse level and at the renderer's own. 0 is as without a DRR, 1 is all, and NaN is
+/// where it cannot be judged.
 struct ViewValue {
   double coarse = 0.0;
   double fine = 0.0;
@@ -39,27 +39,27 @@ struct ViewValue {
   /// gradients there (0 where it is negative), which is the share that a gain times the DRR
   /// explains.
   bool in_silhouette = false;
-  /// The share in detail that poses beside this one explain on average
-  /// (PoseExaminer::view_values); NaN where that was not asked for, or none can be judged.
+  /// The share in detail that poses beside this one explain on average (PoseExaminer::view_values).
+  /// NaN where that was not asked for, or none can be judged.
   double background = std::numeric_limits<double>::quiet_NaN();
 
   auto members() { return std::tie(coarse, fine, in_silhouette, background); }
 };
 
-/// The verdict: found when the end is wrong with at most this risk, not found when it is right with
-/// less than this probability, doubtful between.
+/// The verdict is found when the end is wrong with at most this risk. It is not found when the end
+/// is right with less than the probability below, and doubtful in between.
 inline constexpr double kFoundRisk = 0.01;
 inline constexpr double kLeastConfidence = 0.05;
 
-/// What a view has whose X-ray a pose explains beyond question; for a wrong pose, at least one view
-/// has less (docs/registration-study.md, Verdicts). It steers searches for what is wrong with
-/// X-rays, not the verdict: under stress, right poses have less, too.
+/// The values of a view whose X-ray a pose explains beyond question. For a wrong pose, at least one
+/// view has less (docs/registration-study.md, Verdicts). It guides the search for what is wrong
+/// with X-rays, not the verdict, because right poses under stress have less too.
 struct WellExplained {
   double coarse;
   double fine;
 };
 inline constexpr WellExplained kWellExplained = {0.3, 0.3};
-/// Within silhouettes, by what was measured (docs/howto/bones.md, Verdicts).
+/// The same within silhouettes, as measured (docs/howto/bones.md, Verdicts).
 inline constexpr WellExplained kWellExplainedInSilhouettes = {0.3, 0.23};
 
 /// A view disagrees when its coarse or fine value is below both that of a well explained view and
@@ -67,35 +67,35 @@ inline constexpr WellExplained kWellExplainedInSilhouettes = {0.3, 0.23};
 /// explained.
 inline constexpr double kLeastShareOfOthers = 0.5;
 
-/// Why there is no end at all, from what the search stopped with.
+/// Why there is no end at all, according to why the search stopped.
 std::optional<std::string> failure_of(StopReason stop_reason);
 
-/// What leaves a doubt in an end, however probable it is that it is right: how the search stopped,
-/// an X-ray that cannot be judged, and a target that shows nothing of its own or disagrees with its
-/// surroundings. \test Judgement.ATargetThatDisagreesWithItsSurroundingsIsDoubtful
+/// What leaves a doubt in an end, however probable it is: how the search stopped, an X-ray that
+/// cannot be judged, and a target that shows nothing of its own or disagrees with its surroundings.
+/// \test Judgement.ATargetThatDisagreesWithItsSurroundingsIsDoubtful
 std::vector<std::string> doubts_of(const RegistrationResult& result,
                                    std::span<const ViewValue> values,
                                    const TargetEvidence& target);
 
-/// Whether the target was asked and fits by itself where its surroundings do, and shows enough.
+/// Whether the target was asked, shows enough, and alone fits where its surroundings do.
 bool agrees_with_surroundings(const TargetEvidence& target, std::span<const ViewValue> values);
 
-/// Of an end whose target agrees with its surroundings: its odds times kAgreementOdds. \test
-/// Judgement.AnAgreeingTargetDoublesTheOdds
+/// The confidence in an end whose target agrees with its surroundings: its odds times
+/// kAgreementOdds. \test Judgement.AnAgreeingTargetDoublesTheOdds
 double confidence_if_target_agrees(double confidence);
 
 /// The verdict by the probability that the end is right, UncertaintyReport::confidence. Where no
-/// TRE is predicted, the confidence is a lower bound, by which nothing is rejected.
+/// TRE is predicted, the confidence is a lower bound, and nothing is rejected by it.
 Judgement judged_confidence(const UncertaintyReport& report, std::span<const ViewValue> values);
 
-/// What one view leaves open of a pose that it shows: "depth along the beam within 24 mm", rounded
-/// up; NaN: not known.
+/// What one view leaves open in a pose: "depth along the beam within 24 mm", rounded up. NaN:
+/// unknown.
 std::string depth_text(double depth_95_mm);
 
 /// Whether the other views agree with the pose much better than this one.
 bool disagrees(std::size_t view, std::span<const ViewValue> values);
 
-/// Mean and lowest of one of the values over the views that can be judged; NaN when none can.
+/// Mean and lowest of one of the values, over the views that can be judged. NaN when none can.
 struct ViewSummary {
   double mean = 0.0;
   double lowest = 0.0;
@@ -104,15 +104,15 @@ struct ViewSummary {
 };
 ViewSummary summary_of(std::span<const ViewValue> values, double ViewValue::*value);
 
-/// Mean background of the views that can be judged; NaN when one of them has none, so that it is
-/// of the same views as summary_of() of `fine`.
+/// Mean background of the views that can be judged. NaN when one of them has none, so that it
+/// covers the same views as summary_of() of `fine`.
 /// \test PoseExaminer.MeanBackgroundIsOfTheViewsThatAreJudged
 double mean_background(std::span<const ViewValue> values);
 
-/// By how much more the pose explains in detail than poses beside it: the harmonic mean over the
-/// views that can be judged, of `fine` less `background`. A right pose explains every view, so it
-/// is 0 when a view has no more than its background. NaN when a judged view has none, or no view
-/// can be judged.
+/// How much more the pose explains in detail than poses beside it: the harmonic mean of `fine` less
+/// `background`, over the views that can be judged. A right pose explains every view, so it is 0
+/// when a view has no more than its background. NaN when a judged view has none, or no view can be
+/// judged.
 /// \test PoseExaminer.AViewThatShowsNothingLeavesNoExcess
 double explained_excess(std::span<const ViewValue> values);
 

@@ -16,8 +16,8 @@
 namespace af::registration {
 namespace {
 
-/// A change is reported if it explains this much more of the gradients, on average over the views;
-/// a wrong change gains next to nothing.
+/// A change is reported if it explains this much more of the gradients, averaged over the views. A
+/// wrong change gains almost nothing.
 constexpr double kLeastGain = 0.15;
 
 std::string percent_text(double share) {
@@ -25,14 +25,14 @@ std::string percent_text(double share) {
                               : "nothing";
 }
 
-/// The mean coarse value, NaN counting as 0.
+/// The mean coarse value. NaN counts as 0.
 double mean_of(const std::vector<ViewValue>& values) {
   double sum = 0.0;
   for (const ViewValue& view : values) sum += std::isfinite(view.coarse) ? view.coarse : 0.0;
   return sum / static_cast<double>(values.size());
 }
 
-/// The lowest of one of the values, NaN counting as 0.
+/// The lowest of one of the values. NaN counts as 0.
 double lowest_of(const std::vector<ViewValue>& values, double ViewValue::*value) {
   double lowest = 1.0;
   for (const ViewValue& view : values)
@@ -61,11 +61,11 @@ void negate(RegistrationView& view) {
   for (float& value : view.xray.pixels) value = -value;
 }
 
-/// What the X-ray is when its intensities, not their logarithms, were inverted.
+/// Turns the X-ray into what it is if its intensities, not their logarithms, were inverted.
 void invert_intensities(RegistrationView& view) {
   const auto [low, high] = std::minmax_element(view.xray.pixels.begin(), view.xray.pixels.end());
   const float brightest = std::exp(-*low);
-  // Half the darkest level, about what a detector tells from nothing.
+  // Half the darkest level is about what a detector distinguishes from nothing.
   const float least = std::max(0.5f * std::exp(-*high), 1e-4f * brightest);
   for (float& value : view.xray.pixels)
     value = -std::log(std::max(brightest - std::exp(-value), least) / brightest);
@@ -127,7 +127,7 @@ std::optional<RegistrationOptions> coarse_options(const RegistrationProblem& pro
   return options;
 }
 
-/// The values of the pose to which the changed problem comes from the nominal one; none when it
+/// The values of the pose that the changed problem reaches from the nominal one. None when it
 /// cannot be registered, or when one of them is certainly lower than where the pose explains well.
 std::optional<std::vector<ViewValue>> values_with(const Change& change,
                                                   const RegistrationProblem& problem,
@@ -138,10 +138,10 @@ std::optional<std::vector<ViewValue>> values_with(const Change& change,
   try {
     Registration registration(changed, options, threads);
     const RegistrationResult end = registration.search(changed->nominal_room_from_ct);
-    // The judge of the chains' ends says the mean of the coarse values.
+    // The judge of the chains' ends gives the mean of the coarse values.
     if (!(end.similarity >= kWellExplained.coarse)) return std::nullopt;
     return PoseExaminer(changed, 0.0).view_values(end.room_from_ct);
-  } catch (const InputError&) {  // an X-ray without gradients
+  } catch (const InputError&) {  // an X-ray has no gradients
     return std::nullopt;
   }
 }
@@ -199,8 +199,9 @@ ViewDiagnosis ViewDiagnoser::diagnosis(const std::vector<ViewValue>& view_values
                         lowest_of(view_values, &ViewValue::fine) >= kWellExplained.fine;
   // No change mends a copy: what seems to is a body's symmetry.
   if (is_sound || has_copy) return diagnosis;
-  // Mirrored, a shaft is still a shaft, so silhouettes of bones would fit changed X-rays too; and
-  // changes are tried over the whole region, whose values do not compare with those in silhouettes.
+  // A mirrored shaft is still a shaft, so silhouettes of bones would fit changed X-rays too.
+  // Changes are also tried over the whole region, whose values cannot be compared with those in
+  // silhouettes.
   if (std::ranges::any_of(view_values, &ViewValue::in_silhouette)) return diagnosis;
   if (!remedy_.has_value()) remedy_ = best_remedy(*problem_, threads_);
   const std::optional<Remedy>& remedy = *remedy_;

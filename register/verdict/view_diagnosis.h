@@ -14,10 +14,10 @@ namespace af::registration {
 
 /// What looks wrong with the X-rays of a result.
 struct ViewDiagnosis {
-  std::vector<std::string> messages;  ///< one for each thing found, for people; empty: nothing
+  std::vector<std::string> messages;  ///< one for each thing found, for people
 };
 
-/// A change of the X-rays, not made, and what a pose would explain of them with it.
+/// A change of the X-rays that is not made, and what a pose would explain of them with it.
 struct Remedy {
   std::string text;  ///< "the X-ray of view 'B' mirrored left-right"
   std::vector<ViewValue> view_values;
@@ -28,25 +28,25 @@ struct Remedy {
 /// \test ViewDiagnoser.NamesTheViewAndWhatWouldMendIt
 class ViewDiagnoser {
  public:
-  /// `threads`: none means the calling thread alone.
+  /// Without `threads` only the calling thread works.
   explicit ViewDiagnoser(std::shared_ptr<const RegistrationProblem> problem,
                          std::shared_ptr<ThreadPool> threads = nullptr);
 
-  /// `view_values`: of PoseExaminer, at an end. Where one of them is low, reports the change of
-  /// X-rays that explains most, if that is far more than this end does; values within silhouettes
-  /// are not compared. Always reports views with the same X-ray.
+  /// `view_values`: those of PoseExaminer, at an end. Where one of them is low, reports the change
+  /// of X-rays that explains most, if that is far more than this end does. Values within
+  /// silhouettes are not compared. Always reports views with the same X-ray.
   ///
   /// The X-rays are tried inverted, mirrored left-right and up-down, turned by 180 degrees and
-  /// exchanged, one change at a time, each with a coarse registration from the nominal pose: what
-  /// comes of it depends on the case alone, neither on the end nor on those diagnosed before, and
-  /// is kept from the first time that it is needed.
+  /// exchanged, one change at a time, each with a coarse registration from the nominal pose. The
+  /// outcome depends on the case alone, neither on the end nor on those diagnosed before, and is
+  /// kept from the first time that it is needed.
   /// \test ViewDiagnoser.TriesChangesOncePerCase
   [[nodiscard]] ViewDiagnosis diagnosis(const std::vector<ViewValue>& view_values);
 
  private:
   std::shared_ptr<const RegistrationProblem> problem_;
   std::shared_ptr<ThreadPool> threads_;
-  /// None: not yet looked for. Holding none: no change lets a pose explain enough of every view.
+  /// None: not looked for yet. Holding none: no change lets a pose explain enough of every view.
   std::optional<std::optional<Remedy>> remedy_;
 };
 

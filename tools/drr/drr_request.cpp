@@ -29,28 +29,28 @@
 namespace af::tools {
 namespace {
 
-/// What DRRs are made of and for which camera.
+/// What DRRs are made from, and for which camera.
 struct DrrSource {
   std::filesystem::path ct;  ///< empty: none
   CtReadOptions ct_reading;
   std::optional<CameraGeometry> camera;  ///< none: the field's
-  std::optional<PoseFrame> frame;        ///< none: the field's, or of the CT's centre
+  std::optional<PoseFrame> frame;        ///< none: the field's, or that of the CT's centre
   Eigen::Vector3d isocenter_point = Eigen::Vector3d::Zero();
 };
 
-/// What renders, for which camera, and what pose parameters are relative to.
+/// What renders, for which camera, and the frame of pose parameters.
 struct DrrScene {
   DrrSource source;
-  std::shared_ptr<const DrrRenderer> renderer;   ///< the field's, else the ray caster
+  std::shared_ptr<const DrrRenderer> renderer;   ///< the field's, or else the ray caster
   std::shared_ptr<const DrrRenderer> reference;  ///< the ray caster, for --compare
   View view;
   PoseFrame frame;
   std::shared_ptr<ThreadPool> pool;
-  std::optional<FieldIdentity> stated;  ///< of the only field, looked up for its own camera
-  /// How far the camera is from the field's own, with several fields from the first one's; empty
-  /// for that one.
+  std::optional<FieldIdentity> stated;  ///< that of the only field, looked up for its own camera
+  /// How far the camera is from the field's own, or from the first field's if there are several.
+  /// Empty for that camera itself.
   std::string note;
-  std::vector<std::string> warnings;  ///< of the CT
+  std::vector<std::string> warnings;  ///< about the CT
 };
 
 void describe_source(Fields& field, DrrOptions& options) {
@@ -247,8 +247,8 @@ void require_same_subject(const FieldIdentity& wanted,
                      "must have the attenuation of --field: mu_water and the HU that count as air");
 }
 
-/// The field, or every member of an atlas, to be looked up in the beam's way; with a tube's
-/// spectrum together with the field or atlas of the bone beside it.
+/// The field, or every member of an atlas, to be looked up in the beam's way. With a tube's
+/// spectrum, it goes together with the field or atlas of the bone beside it.
 std::vector<FieldSetMember> renderers_of(const OpenedField& opened,
                                          const DrrOptions& options,
                                          const std::shared_ptr<ThreadPool>& pool,
@@ -264,7 +264,7 @@ std::vector<FieldSetMember> renderers_of(const OpenedField& opened,
   return members;
 }
 
-/// The field's renderer; with further fields, or of an atlas, that of the set.
+/// The field's renderer. With further fields, or for an atlas, it is that of the set.
 std::shared_ptr<const DrrRenderer> renderer_of(const OpenedField& first,
                                                const DrrOptions& options,
                                                const std::shared_ptr<ThreadPool>& pool,
@@ -280,7 +280,7 @@ std::shared_ptr<const DrrRenderer> renderer_of(const OpenedField& first,
   return std::make_shared<const FieldSetDrr>(std::move(members));
 }
 
-/// Of the camera that DRRs are looked up for.
+/// A note about the camera for which DRRs are looked up.
 std::string note_of(const CameraGeometry& camera,
                     const CameraGeometry& of_field,
                     const DrrOptions& options) {
@@ -290,7 +290,7 @@ std::string note_of(const CameraGeometry& camera,
          (options.more_fields.empty() ? "" : ", that of --field");
 }
 
-/// Collective. Reads field, CT and rig. FileError when --compare's CT is not the field's.
+/// Collective. Reads field, CT and rig. Throws FileError when --compare's CT is not the field's.
 DrrScene load_scene(const DrrOptions& options, const Communicator& communicator) {
   DrrScene scene;
   scene.pool = std::make_shared<ThreadPool>(thread_count(options.threads));
@@ -322,8 +322,7 @@ DrrScene load_scene(const DrrOptions& options, const Communicator& communicator)
   return scene;
 }
 
-/// Poses in the order of the options or their file; `notes` get what was left out of it and
-/// assumed.
+/// Poses in the order of the options or their file. `notes` receives what was left out and assumed.
 std::vector<RigidTransform> requested_poses(const DrrOptions& options,
                                             const DrrScene& scene,
                                             std::vector<std::string>& notes) {
@@ -339,7 +338,7 @@ std::vector<RigidTransform> requested_poses(const DrrOptions& options,
   return {pose_of_deg_and_mm(scene.frame, values, "--rotation-deg, --translation-mm")};
 }
 
-/// What is odd about poses that a field's stated range does not hold; empty: nothing.
+/// What is odd about poses that a field's stated range does not hold. Empty: nothing.
 std::string range_note(const std::optional<FieldIdentity>& stated,
                        const std::vector<RigidTransform>& poses) {
   if (!stated) return "";
@@ -356,19 +355,19 @@ std::string range_note(const std::optional<FieldIdentity>& stated,
          " (" + first + "): it was not made for them, though it may hold their rays";
 }
 
-/// InputError when so many DRRs fit neither into memory nor on the disk of the output.
+/// Throws InputError when this many DRRs do not fit into memory, or on the disk of the output.
 void require_room(std::size_t poses, const View& view, const std::filesystem::path& output) {
   const double bytes = static_cast<double>(poses) * static_cast<double>(view.pixel_count()) *
                        static_cast<double>(sizeof(float));
-  // The DRRs, in one block for the writer, and read back to verify them.
+  // The DRRs themselves, one block for the writer, and what is read back to verify them.
   constexpr double kCopies = 3.0;
   require_memory(std::to_string(poses) + " DRRs", kCopies * bytes);
   const bool is_compressed = ends_with(output, ".gz") || ends_with(output, ".png");
   if (!is_compressed) require_disk_space(output, bytes);
 }
 
-/// DRRs of all poses, shared by the threads of the pool; InputError, with `note`, when any ray of
-/// any pose is outside the field.
+/// DRRs of all poses, shared by the threads of the pool. Throws InputError, with `note`, when any
+/// ray of any pose is outside the field.
 std::vector<Image2d> render_poses(const DrrRenderer& renderer,
                                   const View& view,
                                   const std::vector<RigidTransform>& poses,
@@ -388,12 +387,12 @@ std::vector<Image2d> render_poses(const DrrRenderer& renderer,
   return drrs;
 }
 
-/// What a PNG shows: all but outliers.
+/// The window of a PNG: all values but outliers.
 std::array<double, 2> shown_window(const Image2d& image) {
   return percentile_window(image, 0.5, 99.5);
 }
 
-/// One DRR, a stack of several, or a PNG, by the name's extension. Returns a line about it.
+/// Writes one DRR, a stack of several, or a PNG, by the name's extension. Returns a line about it.
 std::string write_drrs(const std::vector<Image2d>& drrs,
                        const View& view,
                        const DrrOptions& options) {
@@ -417,7 +416,7 @@ std::string write_drrs(const std::vector<Image2d>& drrs,
   return line.str();
 }
 
-/// Field, ray cast and difference of one pose in one PNG. Returns the PSNR in words.
+/// Writes field, ray cast and difference of one pose into one PNG. Returns the PSNR in words.
 std::string write_comparison(const DrrScene& scene,
                              const RigidTransform& room_from_ct,
                              const std::filesystem::path& path) {
@@ -492,9 +491,15 @@ void run_drr(const DrrOptions& options, const Communicator& world) {
   require_room(poses.size(), scene.view, options.output);
   const std::vector<Image2d> drrs =
       render_poses(*scene.renderer, scene.view, poses, *scene.pool, scene.note);
-  for (std::size_t i = 0; i < drrs.size(); ++i)
-    if (std::ranges::all_of(drrs[i].pixels, [](float value) { return value == 0.0f; }))
-      warn(world, "pose " + std::to_string(i) + ": the DRR is empty: no ray meets the CT");
+  const auto is_empty = [](const Image2d& drr) {
+    return std::ranges::all_of(drr.pixels, [](float value) { return value == 0.0f; });
+  };
+  if (const auto first = std::ranges::find_if(drrs, is_empty); first != drrs.end())
+    warn(world,
+         std::to_string(std::ranges::count_if(first, drrs.end(), is_empty)) + " of " +
+             std::to_string(drrs.size()) + " DRRs are empty, the first at pose " +
+             std::to_string(first - drrs.begin()) +
+             ": no ray meets the CT; check the pose and the camera");
   std::cout << write_drrs(drrs, scene.view, options) << '\n';
 }
 

@@ -20,7 +20,7 @@ namespace af::tools {
 /// The options of af-drr as typed.
 struct DrrOptions {
   std::filesystem::path field;
-  std::vector<std::string> more_fields;  ///< of the same CT, for other angles
+  std::vector<std::string> more_fields;  ///< for the same CT, but other angles
   std::filesystem::path ct;
   CtReadOptions ct_reading;
   std::filesystem::path study;  ///< instead of ct and rig
@@ -45,8 +45,8 @@ struct DrrOptions {
 /// All impossible values and combinations of options; empty when the options are sound.
 std::vector<std::string> problems(const DrrOptions& options);
 
-/// Collective. Makes the DRRs that are asked for and writes them. InputError when a ray of a pose
-/// is outside the field, FileError when --compare's CT is not the field's.
+/// Collective. Makes the requested DRRs and writes them. Throws InputError when a ray of a pose is
+/// outside the field, FileError when --compare's CT is not the field's.
 void run_drr(const DrrOptions& options, const Communicator& world);
 
 }  // namespace af::tools

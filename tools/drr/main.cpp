@@ -6,7 +6,7 @@
 #include "cli/slicer_module.h"
 #include "tools/drr/drr_request.h"
 
-// Binding options can throw only by a defect, which may well end the program.
+// Binding options can only throw by a defect, which may well end the program.
 // NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
   af::tools::DrrOptions options;

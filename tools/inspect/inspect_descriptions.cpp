@@ -78,8 +78,8 @@ bool have_common_case(const Study& study, const std::string& camera, const std::
   });
 }
 
-/// Whether the field of a view is of the case's CT, and what it covers of the rays that
-/// registrations look at, about the case's nominal pose: those of twice its region.
+/// Whether the field of a view belongs to the case's CT. Also says what it covers of the rays that
+/// registrations look at, which are those of twice its region, about the case's nominal pose.
 void describe_field(const StudyCase& study_case,
                     const StudyView& view,
                     const CameraGeometry& camera,
@@ -113,7 +113,7 @@ ordered_json view_json(const StudyCase& study_case,
   json["xray"] = view.xray.string();
   json["xray_domain"] = view.xray_domain == XrayDomain::Intensity ? "intensity" : "attenuation";
   json["roi_px"] = {view.roi.column, view.roi.row, view.roi.width, view.roi.height};
-  // Those that the view shows.
+  // Only those that the view shows count.
   json["fiducials"] = std::count_if(view.fiducials_px.begin(),
                                     view.fiducials_px.end(),
                                     [](const Eigen::Vector2d& point) { return point.allFinite(); });
@@ -210,7 +210,7 @@ void describe_image_quality(const CsvTable& table, Inspection& inspection) {
                                         : ordered_json(*std::min_element(psnr.begin(), psnr.end()));
 }
 
-/// Copies what is short and simple; long arrays become their length.
+/// Copies what is short and simple. Long arrays become their length.
 ordered_json shortened(const ordered_json& json) {
   constexpr std::size_t kMaxArray = 16;
   if (json.is_array() && json.size() > kMaxArray) return std::to_string(json.size()) + " entries";
@@ -275,7 +275,7 @@ void inspect_csv(const fs::path& path, Inspection& inspection) {
   if (has_columns(table, {"rx_deg", "ry_deg", "rz_deg", "tx_mm", "ty_mm", "tz_mm"}) ||
       has_columns(table, {"m00", "m23"})) {
     inspection.kind = "poses";
-    // The frame only gives the parameters a place; any frame is good enough to check them.
+    // The frame only gives the parameters a place, so any frame is good enough to check them.
     inspection.facts["poses"] = read_pose_file(path, {PoseFrame{}, {}}).poses.size();
     return;
   }

@@ -66,13 +66,13 @@ ordered_json provenance_json(const FieldProvenance& provenance) {
   ordered_json details;
   try {
     details = ordered_json_of_text(provenance.provenance_json, "provenance");
-  } catch (const FileError&) {  // shown as it is
+  } catch (const FileError&) {  // it is shown as it is
   }
   if (!details.is_object()) {
     json["details"] = provenance.provenance_json;
     return json;
   }
-  // These are printed above already.
+  // These have been printed above.
   details.erase("command_line");
   details.erase("options_toml");
   // A summary needs how the training ended, not each step.
@@ -88,7 +88,7 @@ ordered_json provenance_json(const FieldProvenance& provenance) {
   return json;
 }
 
-/// The camera, the poses and the CT.
+/// Adds the camera, the poses and the CT.
 void describe_identity(const FieldIdentity& identity, ordered_json& facts) {
   facts["camera"] = camera_json(identity.camera);
   facts["center_ct_mm"] = vector_json(identity.frame.center_ct_mm);
@@ -122,7 +122,7 @@ std::string coverage_of(const OpenedField& opened, const CameraGeometry& camera)
                        opened.coverage().box(view, identity.frame, identity.range));
 }
 
-/// The members have the same counts of nodes, and about the same planes.
+/// The members have the same counts of nodes, and almost the same planes.
 ordered_json members_json(const OpenedField& opened) {
   ordered_json members;
   for (const AtlasMember& member : opened.atlas()->members) {
@@ -139,7 +139,7 @@ ordered_json members_json(const OpenedField& opened) {
   return members;
 }
 
-/// Every index is read, member by member, and thereby verified.
+/// Reads every index, member by member, which verifies it.
 void verify_members(const OpenedField& opened, const Communicator& communicator) {
   for (std::size_t i = 0; i < opened.coverage().planes.size(); ++i)
     (void)opened.member(i, communicator);

@@ -32,7 +32,7 @@ constexpr int kBoneFromHu = 300;
 /// Slices this much thicker than pixels are wide make lateral DRRs coarse.
 constexpr double kAnisotropyLimit = 3.0;
 constexpr std::size_t kMaxPixels = std::size_t{1} << 28;
-/// Tissue on more than this share of a side face means that the body goes on outside the image.
+/// Tissue on more than this share of a side face means that the body continues outside the image.
 constexpr double kCutBodyShare = 0.05;
 
 struct HuStatistics {
@@ -62,7 +62,7 @@ struct HuStatistics {
   }
 };
 
-/// Where an axis points in the patient: "L" and its like; two letters when oblique.
+/// Where an axis points in the patient: "L" and the like, with two letters when oblique.
 std::string patient_letters(const Eigen::Vector3d& direction) {
   constexpr std::array<std::array<char, 2>, 3> kLetters = {{{'L', 'R'}, {'P', 'A'}, {'S', 'I'}}};
   constexpr double kVisibleShare = 0.05;  // about 3 degrees
@@ -90,7 +90,7 @@ ordered_json grid_json(const CtGrid& grid) {
   return json;
 }
 
-/// Share of tissue on a face of the volume: the first or last index of an axis.
+/// Share of tissue on a face of the volume, which is the first or last index of an axis.
 double tissue_share_on_face(const CtVolume& ct, std::size_t axis, bool at_end) {
   const auto& size = ct.grid.size;
   std::array<int, 3> low = {0, 0, 0};
@@ -110,7 +110,7 @@ double tissue_share_on_face(const CtVolume& ct, std::size_t axis, bool at_end) {
 void warn_of_cut_body(const CtVolume& ct, Inspection& inspection) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const Eigen::Vector3d direction = ct.grid.direction.col(static_cast<Eigen::Index>(axis));
-    // Head and foot ends are cut in every CT.
+    // The head and foot ends of every CT are cut.
     if (std::abs(direction.z()) > 0.7) continue;
     for (const bool at_end : {false, true}) {
       const double share = tissue_share_on_face(ct, axis, at_end);
@@ -134,7 +134,7 @@ void warn_of_ct(const CtVolume& ct, const HuStatistics& hu, Inspection& inspecti
   if (ct.grid.direction.determinant() < 0.0)
     inspection.warnings.push_back(
         "left-handed voxel order: read correctly, but check left and right in a DRR");
-  // Values without any air are no HU, as read_ct() says; every face would count as tissue.
+  // Values without any air are not HU, as read_ct() says, and every face would count as tissue.
   if (hu.quantile(0.0) >= kNoAirFromHu) return;
   if (hu.share(kAirBelowHu, 32768) > 0.999)
     inspection.warnings.push_back("almost no air: cropped to the body?");
@@ -167,7 +167,7 @@ void add_value_facts(std::vector<float> values, Inspection& inspection) {
   if (json["min"] == json["max"]) inspection.warnings.emplace_back("constant image: shows nothing");
 }
 
-/// A stack of DRRs holds line integrals: floats of 0 to a few tens, which a CT in HU never does.
+/// A stack of DRRs holds line integrals: floats of 0 to a few tens. A CT in HU never does.
 bool holds_line_integrals(const RawImage& image) {
   if (image.type != ValueType::Float32) return false;
   return visit_values(image, [](const auto values) {
@@ -194,7 +194,7 @@ void inspect_picture(const Image2d& image, Inspection& inspection) {
   add_value_facts(image.pixels, inspection);
 }
 
-/// The values are those of what is no padding.
+/// The values described are those that are not padding.
 void inspect_dicom(const fs::path& path, Inspection& inspection) {
   DicomXray xray = read_dicom_xray(path, std::nullopt);
   if (!xray.padding.empty()) {
@@ -236,7 +236,7 @@ void inspect_image(const fs::path& path, const CtReadOptions& options, Inspectio
   if (*format == ImageFormat::Dicom) return inspect_dicom(path, inspection);
   inspection.kind = "image";
   const ImageHeader header = read_image_header(path, *format);
-  // Volumes whose values cannot be floats are read once, as CTs.
+  // Volumes whose values cannot be floats are read only once, as CTs.
   const auto long_axes = std::count_if(header.image.size.begin(),
                                        header.image.size.end(),
                                        [](std::size_t extent) { return extent > 1; });

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One function per kind of file: adds kind, facts and warnings to an inspection, or throws
+// One function per kind of file. Each adds kind, facts and warnings to an inspection, or throws
 // af::Error.
 #pragma once
 
@@ -12,7 +12,7 @@ namespace af {
 void inspect_ct(const std::filesystem::path& path,
                 const CtReadOptions& options,
                 Inspection& inspection);
-/// A 2-D image, or a stack of DRRs; a 3-D image of HU is handed to inspect_ct().
+/// A 2-D image, or a stack of DRRs. A 3-D image of HU is passed to inspect_ct().
 void inspect_image(const std::filesystem::path& path,
                    const CtReadOptions& options,
                    Inspection& inspection);

@@ -15,7 +15,7 @@
 namespace af {
 namespace {
 
-/// The report of each path as soon as it is known; JSON is one array.
+/// Prints the report of each path as soon as it is known. JSON is one array.
 void print(const InspectOptions& options, const std::vector<Inspection>& inspections) {
   if (!options.as_json) {
     for (const Inspection& inspection : inspections) std::cout << to_text(inspection);
@@ -40,13 +40,12 @@ void InspectOptions::describe(Fields& field) {
   field("json", as_json, "Print one JSON array instead of text");
   field("list_views",
         lists_views,
-        "Of studies, for scripts: one line per view, its case and its camera with a tab between "
+        "For scripts: print one line per view of a study, its case and camera with a tab between "
         "them")
       .excludes({"--json"});
   field("list_inputs",
         lists_inputs,
-        "Of studies, for scripts: one line per case and file that it reads, with a tab between "
-        "them")
+        "For scripts: print one line per case and file that a study reads, with a tab between them")
       .excludes({"--json", "--list-views"});
   field("pictures",
         pictures,
@@ -93,7 +92,7 @@ void run_inspect(const InspectOptions& options, const Communicator& world) {
   if (world.is_root()) print(options, inspections);
   if (worst == ExitCode::Done) return;
   std::cout.flush();
-  // Every rank knows the same; only one says it.
+  // Every rank knows the same, but only one says it.
   throw RemoteError(worst,
                     std::to_string(bad) + " of " + std::to_string(options.paths.size()) +
                         " paths not usable; the reasons are in the report");

@@ -24,8 +24,8 @@ struct InspectOptions {
   void describe(Fields& field);
 };
 
-/// Collective. Reports on paths, or prints templates, draws pictures. An
-/// error with the worst exit code, once all is reported, when a path is not usable.
+/// Collective. Reports on paths, prints templates or draws pictures. When a path is not usable,
+/// throws an error with the worst exit code, once everything is reported.
 void run_inspect(const InspectOptions& options, const Communicator& world);
 
 }  // namespace af

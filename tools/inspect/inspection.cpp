@@ -101,7 +101,7 @@ void inspect_text(const fs::path& path, const CtReadOptions& options, Inspection
   throw not_recognised(path);
 }
 
-/// DICOM images have other marks than registrations.
+/// HDF5 and DICOM files of other programs are refused before they are read as fields or images.
 void inspect_file(const fs::path& path,
                   const CtReadOptions& options,
                   const Communicator& communicator,
@@ -119,7 +119,7 @@ void inspect_file(const fs::path& path,
 /// The files of a folder that mean something to this project, in the order of their names.
 std::vector<fs::path> known_files(const fs::path& folder) {
   std::vector<fs::path> files;
-  std::error_code error;  // of a link that leads nowhere or in circles
+  std::error_code error;  // for a link that leads nowhere or in circles
   for (const auto& entry : fs::directory_iterator(folder)) {
     const std::string name = entry.path().filename().string();
     const bool known = name == "result.json" || name == "summary.json" ||
@@ -169,7 +169,7 @@ void inspect_anything(const fs::path& path,
   throw FileError(path.string(), fs::exists(path, error) ? "is no regular file" : "does not exist");
 }
 
-/// The name of a CT's file or folder without endings: "ct" of ct.nii.gz.
+/// The name of a CT's file or folder without its endings: "ct" for ct.nii.gz.
 std::string picture_stem(const fs::path& path) {
   const fs::path name = (path / "").parent_path().filename();
   const std::string text = name.string();

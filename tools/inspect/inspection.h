@@ -24,7 +24,7 @@ struct Inspection {
 };
 
 /// Collective. Recognises a path by content and checks it completely (fields: every checksum).
-/// Problems of the file come in the result, never as exceptions.
+/// Problems of the file are in the result, never exceptions.
 Inspection inspect_path(const std::filesystem::path& path,
                         const CtReadOptions& options,
                         const Communicator& communicator);
@@ -38,24 +38,24 @@ nlohmann::ordered_json to_json(const Inspection& inspection);
 /// For people: one fact per line.
 std::string to_text(const Inspection& inspection);
 
-/// What was drawn, for people, and what of it cannot be right.
+/// What was drawn, for people, and which of it cannot be right.
 struct DrawnPictures {
   std::string text;
   std::vector<std::string> problems;
 };
 
 /// Draws the pictures of every case of a study (draw_study_pictures()), or of a CT
-/// (draw_ct_pictures()), into a folder, which is made. Throws as read_study() and reading what the
-/// study names, or as read_ct().
+/// (draw_ct_pictures()), into a folder, which is created. Throws as read_study() and reading what
+/// the study names do, or as read_ct() does.
 DrawnPictures draw_pictures(const std::filesystem::path& study_or_ct,
                             const CtReadOptions& ct_reading,
                             const std::filesystem::path& folder);
 
-/// For scripts: one line per view of a study, "case<tab>camera". Throws as read_study().
+/// For scripts: one line per view of a study, "case<tab>camera". Throws as read_study() does.
 std::string view_lines(const std::filesystem::path& study_path);
 
 /// For scripts: a line "case<tab>path" for every file that a study's cases read: CT, rig (unless it
-/// is a shipped one), X-rays, masks. FileError and InputError as read_study().
+/// is shipped), X-rays, masks. Throws FileError and InputError as read_study() does.
 std::string input_lines(const std::filesystem::path& study_path);
 
 }  // namespace af

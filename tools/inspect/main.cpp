@@ -5,7 +5,7 @@
 #include "cli/bind_options.h"
 #include "tools/inspect/inspect_run.h"
 
-// Binding options can throw only by a defect, which may well end the program.
+// Binding options can only throw by a defect, which may well end the program.
 // NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
   af::InspectOptions options;

@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "ranks/communicator.h"
 #include "ranks/launcher.h"
+#include "ranks/terminal.h"
 #include "ranks/work_queue.h"
 
 namespace af {
@@ -110,6 +111,14 @@ TEST(WorkQueueAlone, EndsWithTheItemThatFails) {
                              }),
                RemoteError);
   EXPECT_THAT(items, ElementsAre(0, 1));
+}
+
+TEST(TerminalAlone, GivesEveryWarningOnce) {
+  testing::internal::CaptureStderr();
+  for (const char* text : {"ct.mha: odd", "ct.mha: odd", "xray.mha: odd", "ct.mha: odd"})
+    warn(Communicator::alone(), text);
+  EXPECT_EQ(testing::internal::GetCapturedStderr(),
+            "warning: ct.mha: odd\nwarning: xray.mha: odd\n");
 }
 
 }  // namespace
