@@ -52,7 +52,7 @@ def fields():
 
 def register(example):
     code = example.read_text(encoding="utf-8").split("\n", 1)[1]
-    readme = (Path(sys.argv[1]).parent / "README.md").read_text(encoding="utf-8")
+    readme = (example.parent.parent / "README.md").read_text(encoding="utf-8")
     expect(f"```python\n{code}```" in readme, f"README.md does not quote {example}")
     command = re.search(r"^af-simulate .*$", readme, re.MULTILINE).group().split()
     program = Path(os.environ["AF_PROGRAMS"], command[0])
