@@ -63,6 +63,8 @@ def main() -> None:
         (information / "WHEEL").write_text(WHEEL.format(tag=tag))
         output = Path(options.output)
         output.mkdir(parents=True, exist_ok=True)
+        for earlier in output.glob("*.whl"):  # pip install *.whl means one
+            earlier.unlink()
         subprocess.run(
             [sys.executable, "-m", "wheel", "pack", str(tree), "--dest-dir", str(output)], check=True
         )

@@ -3,7 +3,7 @@
 import argparse
 import re
 
-VERSION = "0.1.0"
+VERSION = "0.2.0"
 
 
 class HelpAs(argparse.Action):

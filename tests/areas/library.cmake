@@ -38,8 +38,8 @@ if(AF_BUILD_PYTHON)
   af_add_python_test(torch ${CMAKE_CURRENT_SOURCE_DIR}/python/test_torch.py)
   af_add_python_test(field_format ${CMAKE_CURRENT_SOURCE_DIR}/python/test_field_format.py
                      ${PROJECT_SOURCE_DIR}/docs/reference/field-format.md)
-  foreach(example look_up_and_compare register_with_torch register_a_phantom evaluate_results decode_viewpoint)
-    af_add_python_test(example_${example} ${CMAKE_CURRENT_SOURCE_DIR}/python/test_examples.py ${PROJECT_SOURCE_DIR}/python/examples
+  foreach(example 01_register 02_look_up 03_starts 04_success 05_patients decode_viewpoint register_with_torch)
+    af_add_python_test(example_${example} ${CMAKE_CURRENT_SOURCE_DIR}/python/test_examples.py ${PROJECT_SOURCE_DIR}/examples
                        ${example})
   endforeach()
   add_test(NAME python.wheel COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/python/test_wheel.sh ${CMAKE_COMMAND} ${PROJECT_BINARY_DIR}

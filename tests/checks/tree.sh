@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# The tree holds no path of anybody's machine, no tab and no mark of an unfinished merge, every source names its licence, and every text file ends with a line
-# end. Usage: tree.sh ROOT
+# The tree holds no path of anybody's machine, no tab and no mark of an unfinished merge, every source names its licence,
+# every text file ends with a line end, and files that state the version state the same. Usage: tree.sh ROOT
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
 source "$(dirname "$0")/source_files.sh"
 root=$1
-mapfile -d '' -t files < <(list_sources "$root" '*.h' '*.cpp' '*.in' '*.txt' '*.cmake' '*.sh' '*.py' '*.pyi' '*.md' '*.toml' '*.json' '*Snakefile')
+mapfile -d '' -t files < <(list_sources "$root" '*.h' '*.cpp' '*.in' '*.txt' '*.cmake' '*.sh' '*.py' '*.pyi' '*.md' '*.toml' '*.json' '*.cff' '*.yml' '*Snakefile')
 ((${#files[@]} > 0)) || { echo "no sources found below $root" >&2; exit 1; }
 cd "$root"
 failed=no
@@ -38,5 +38,22 @@ for file in "${files[@]}"; do
       ;;
   esac
 done
+version=$(sed -n 's/^project(.* VERSION \([0-9.]*\) .*/\1/p' CMakeLists.txt)
+[[ "$version" == *.*.* ]] || { echo "tree: CMakeLists.txt states no version" >&2; exit 1; }
+interface=${version%.*}
+while IFS=: read -r file text; do
+  if ! grep -qF -- "$text" "$file"; then
+    echo "$file: no '$text', though CMakeLists.txt states version $version" >&2
+    failed=yes
+  fi
+done <<END
+CITATION.cff:version: $version
+docs/changelog.md:## $version
+docs/library.md:find_package(AttenuationFields $interface REQUIRED)
+docs/library.md:libattenuation_fields.so.$interface
+docs/packages.md:libattenuation-fields$interface
+python/af_programs/argument_pages.py:VERSION = "$version"
+tests/library/example/CMakeLists.txt:find_package(AttenuationFields $interface REQUIRED)
+END
 [[ "$failed" == no ]] || exit 1
 echo "tree: ${#files[@]} files hold no machine's path and name their licence"

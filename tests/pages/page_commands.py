@@ -114,7 +114,7 @@ def run(page, programs, data=None):
     with tempfile.TemporaryDirectory(prefix="page ") as folder:
         if data:
             shutil.copytree(data, folder, dirs_exist_ok=True)
-        for name in ("jobs", "tests", "docs", "common"):
+        for name in ("jobs", "tests", "docs", "common", "examples"):
             (Path(folder) / name).symlink_to(root / name)
         script = script_of(page)
         wanted = [word for word in ("cam01.txt", "results/") if f" {word}" in script]

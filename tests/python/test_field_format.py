@@ -20,7 +20,7 @@ import numpy as np
 STUDY = Path(os.environ["AF_LIBRARY_STUDY"])
 # Together they have every dataset that a file can have.
 FIELDS = ("AP.af.h5", "AP.bone.af.h5", "AP.standard.af.h5", "AP.atlas.af.h5")
-EXAMPLE = Path(__file__).parents[2] / "python" / "examples" / "decode_viewpoint.py"
+EXAMPLE = Path(__file__).parents[2] / "examples" / "decode_viewpoint.py"
 PAGE = Path(sys.argv.pop(1)).read_text(encoding="utf-8")
 # So close to the middle between two nodes nobody can say which one is nearest. Positions below 1e4 mm are rounded to
 # 2e-12 mm, some ten times on their way to a node's number, and nodes are more than 1 mm apart.

@@ -1,15 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 # %% [markdown]
-# A DRR looked up in a field beside the same DRR cast through the CT.
+# DRRs looked up in a field beside the same DRRs cast through the CT.
 #
-#     python3 look_up_and_compare.py FIELD.af.h5 CT [PICTURE.png]
-#
-# The picture needs Debian's python3-matplotlib, or `pip install matplotlib`.
+#     python3 02_look_up.py FIELD.af.h5 CT
 
 # %%
 import sys
 from time import perf_counter
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import attenuation_fields as af
@@ -55,16 +54,15 @@ for name, plane in zip(("rx", "ry", "rz", "tx", "ty", "tz"), gradient):
     print(f"  d/d{name}: {plane.min():+.3f} to {plane.max():+.3f}")
 
 # %%
-if len(sys.argv) > 3:
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(1, 3, figsize=(12, 4))
-    difference = looked_up[0] - cast[0]
-    largest = np.abs(difference).max()
-    axes[0].imshow(looked_up[0], cmap="gray")
-    axes[0].set_title("field")
-    axes[1].imshow(cast[0], cmap="gray")
-    axes[1].set_title("ray casting")
-    axes[2].imshow(difference, cmap="RdBu", vmin=-largest, vmax=largest)
-    axes[2].set_title(f"difference, within {largest:.3f}")
-    figure.savefig(sys.argv[3])
+difference = looked_up[0] - cast[0]
+largest = np.abs(difference).max()
+figure, axes = plt.subplots(1, 3, figsize=(7.2, 2.8))
+axes[0].imshow(looked_up[0], cmap="gray")
+axes[0].set_title("looked up")
+axes[1].imshow(cast[0], cmap="gray")
+axes[1].set_title("cast")
+axes[2].imshow(difference, cmap="RdBu", vmin=-largest, vmax=largest)
+axes[2].set_title(f"difference, within {largest:.2f}")
+for panel in axes:
+    panel.axis("off")
+figure.savefig("looked-up.png", bbox_inches="tight")
