@@ -105,6 +105,8 @@ def draws_text(rule):
                 "says what is left of the half that it makes up near the pose")
     if rule == "given":
         return "The starts were given by a table"
+    if rule == "search":
+        return "Each case looked for its starts itself: its initial error is that of the nominal pose, which it did not use"
     return ("Draws outside the fields' motion range were refused and drawn again; where many were, rotation makes up less of the "
             "starts than the half that it does without refusals")
 

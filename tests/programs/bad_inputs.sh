@@ -212,6 +212,12 @@ of_study 3 'must lie on the detector' 'landmark off the detector' "$(marked 'lan
 of_study 3 'has 2 entries' 'fewer landmarks than are marked in the CT' "$(marked 'landmarks_ct_mm = [[0,0,0],[9,1,1],[2,8,2]]' 'landmarks_px = [[1,2],[3,4]]')"
 of_study 3 'must be a list of' 'landmarks that are no points' "$(marked 'landmarks_ct_mm = [[0,0,0],[9,1,1],[2,8,2]]' 'landmarks_px = [[1,2],["a",4],[inf,3]]')"
 of_study 3 'landmarks_ct_mm' 'landmark in the CT at 1e300 mm' "$(marked 'landmarks_ct_mm = [[0,0,0],[9,1,1],[2,8,1e300]]' 'landmarks_px = [[1,2],[3,4],[5,6]]')"
+row 3 '--search-rotation-deg' 'search of negative angles' "$bin/af-register" --renderer raycast -o out/result --start search \
+  --search-rotation-deg 5,-1,5 --study valid/study.toml
+row 3 'must be left out' 'search of all rotations within some' "$bin/af-register" --renderer raycast -o out/result --start search \
+  --search-orientations any --search-rotation-deg 5,5,5 --study valid/study.toml
+row 2 'search-orientations' 'search of unknown orientations' "$bin/af-register" --renderer raycast -o out/result --start search \
+  --search-orientations upright --study valid/study.toml
 row 3 'landmarks' 'start from landmarks that no view shows' "$bin/af-register" --renderer raycast -o out/result --start landmarks \
   --study "$(marked 'landmarks_ct_mm = [[0,0,0],[9,1,1],[2,8,2]]' 'landmarks_px = [[],[],[]]')"
 of_study 4 'gone.mha' 'X-ray missing' "$(edited study.toml '0,/^xray = .*/s//xray = "gone.mha"/')"

@@ -290,6 +290,23 @@ TEST_F(EvaluateProgram, RegistersFromTheStartsOfAFile) {
                  "less than the number of starts, 4");
 }
 
+TEST_F(EvaluateProgram, RegistersACaseThatLooksForItsStart) {
+  const std::string arguments = "registration --study " + path("study.toml") + fields() +
+                                "--no-pictures --start-rule search --search-modes 2 -o ";
+  for (const int ranks : {1, 2})
+    ASSERT_EQ(evaluate(arguments + path("search-" + std::to_string(ranks)), ranks).exit_code, 0);
+  const CsvTable rows = CsvTable::read(path("search-1/registrations.csv"));
+  const CsvTable same = CsvTable::read(path("search-2/registrations.csv"));
+  ASSERT_EQ(rows.row_count(), 1u);
+  EXPECT_EQ(rows.text(0, "success"), "1");
+  for (const char* column : {"initial_tre_mm", "tre_mm", "similarity", "verdict"})
+    EXPECT_EQ(rows.text(0, column), same.text(0, column)) << column;
+  // The start of the row is the nominal pose.
+  EXPECT_EQ(rows.text(0, "initial_tre_mm"),
+            CsvTable::read(path("search-1/starts.csv")).text(0, "initial_tre_mm"));
+  EXPECT_EQ(json::parse(text("search-1/summary.json"))["start_rule"], "search");
+}
+
 TEST_F(EvaluateProgram, DrawsSimilarityAboutTheGoldPoseAlikeOnAnyRankCount) {
   const std::string arguments =
       "similarity-curves --study " + path("study.toml") + fields() +

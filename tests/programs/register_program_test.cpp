@@ -117,6 +117,50 @@ TEST_F(RegisterProgram, RegistersByFieldAndByRayCasting) {
   EXPECT_NE(provenance.at("input_notes").at("xray AP"), "");
 }
 
+TEST_F(RegisterProgram, SearchesWhereNoStartIsKnown) {
+  const std::string search =
+      "--renderer raycast --no-pictures --start search --search-modes 2 --search-rotation-deg "
+      "15,15,15 --search-translation-mm 15,15,15 -o ";
+  const test::ProgramRun alone = run_register(search + path("searched"));
+  ASSERT_EQ(alone.exit_code, 0) << alone.output;
+  EXPECT_NE(alone.output.find("search      "), std::string::npos) << alone.output;
+  const nlohmann::json found = result("searched");
+  EXPECT_LT(found.at("tre_mm").get<double>(), kRayCastTreMm);
+  EXPECT_EQ(found.at("start_search").at("likeness_per_start").size(), 2u);
+  EXPECT_GT(found.at("start_search").at("rotations").get<int>(), 1);
+  EXPECT_TRUE(found.contains("rival"));
+
+  const test::ProgramRun two = test::run_command(
+      "OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 mpirun -n 2 --oversubscribe " +
+      program("af-register") + " --study " + path("study.toml") + " " + search +
+      path("searched-2"));
+  ASSERT_EQ(two.exit_code, 0) << two.output;
+  const nlohmann::json same = result("searched-2");
+  for (const char* key : {"room_from_ct", "start_room_from_ct", "similarity", "verdict", "rival"})
+    EXPECT_EQ(same.at(key), found.at(key)) << key;
+  EXPECT_EQ(same.at("start_search").at("likeness_per_start"),
+            found.at("start_search").at("likeness_per_start"));
+}
+
+TEST_F(RegisterProgram, SearchesTheRangeOfItsFieldsAndNoFarther) {
+  const test::ProgramRun within =
+      run_register(fields() + " --no-pictures --start search -o " + path("searched-fields"));
+  ASSERT_EQ(within.exit_code, 0) << within.output;
+  EXPECT_NE(within.output.find("+-8 degrees, +-12 mm"), std::string::npos) << within.output;
+  EXPECT_LT(result("searched-fields").at("tre_mm").get<double>(), kFieldTreMm);
+  for (const char* beyond : {"--search-orientations any",
+                             "--search-orientations flips",
+                             "--search-rotation-deg 9,1,1",
+                             "--search-translation-mm 1,1,13"})
+    expect_refused(run_register(fields() + " --start search " + beyond + " -o " + path("beyond")),
+                   3,
+                   "--renderer raycast searches everywhere");
+  expect_refused(run_register("--renderer raycast --start search --start-rotation-deg 1,1,1 -o " +
+                              path("beyond")),
+                 3,
+                 "must be left out when another start is given");
+}
+
 TEST_F(RegisterProgram, DrawsNoPicturesWhereNoneAreWanted) {
   const std::string command =
       "--renderer raycast --preset fast --start-rotation-deg -1,0.5,2.5 -o " + path("pictures");
