@@ -460,11 +460,12 @@ void Run::run_portfolio() {
                                                                     : best.stop_reason;
 }
 
-/// Ends nearer than this to each other are the same place: the wrong ones among them lie this far
-/// from the right one at most.
+/// Ends nearer to each other than this are one place: searches end a few millimetres apart under
+/// stress, and wrong orientations or neighbouring vertebrae lie farther away.
 constexpr double kElsewhereMm = 10.0;
 
-/// An end with a rival of this share or more is doubtful.
+/// An end with a rival of this share or more is doubtful. The judge prefers wrong ends by up to a
+/// tenth (kRivalShare).
 constexpr double kAmbiguousShare = 0.9;
 
 const std::vector<Eigen::Vector3d>& points_of(const RegistrationProblem& problem) {
@@ -473,8 +474,8 @@ const std::vector<Eigen::Vector3d>& points_of(const RegistrationProblem& problem
 
 std::string ambiguity_text(const RivalEnd& rival) {
   return "ambiguous: an end " + std::to_string(std::lround(rival.apart_mm)) +
-         " mm from here explains the X-rays " + std::to_string(std::lround(100.0 * rival.share)) +
-         " % as well";
+         " mm from here reaches " + std::to_string(std::lround(100.0 * rival.share)) +
+         " % of its similarity";
 }
 
 }  // namespace
@@ -636,7 +637,7 @@ void set_rival(const RegistrationProblem& problem,
                const std::vector<RegistrationRecord>& records,
                RegistrationRecord& record) {
   record.rival.reset();
-  if (!record.result.has_pose()) return;
+  if (!record.result.has_pose() || record.result.similarity <= 0.0) return;
   for (const RegistrationRecord& other : records) {
     if (!other.result.has_pose()) continue;
     const double apart_mm =

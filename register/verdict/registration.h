@@ -122,7 +122,7 @@ bool is_better(const RegistrationRecord& a, const RegistrationRecord& b);
 std::size_t best_record(const std::vector<RegistrationRecord>& records);
 
 /// Sets the rival of a record among those of one problem: nothing where all others that have an end
-/// ended at the same place. \test Registration.AnEndElsewhereThatIsAsAlikeIsARival
+/// ended at the same place. \test Judgement.AnEndElsewhereThatIsAsAlikeLeavesADoubt
 void set_rival(const RegistrationProblem& problem,
                const std::vector<RegistrationRecord>& records,
                RegistrationRecord& record);

@@ -67,6 +67,43 @@ TEST(Judgement, SaysTheProbabilityAndWhatWasWanted) {
       "known");
 }
 
+TEST(Judgement, AnEndElsewhereThatIsAsAlikeLeavesADoubt) {
+  const test::SmallCase small = test::small_case();
+  const auto ended = [](double similarity, double x_mm) {
+    RegistrationRecord record = record_with(0.9968);
+    record.result.similarity = similarity;
+    record.result.room_from_ct.translation().x() = x_mm;
+    return record;
+  };
+  RegistrationRecord record = ended(0.8, 0.0);
+  // The same place, no end, and two places elsewhere.
+  set_rival(*small.problem, {record, ended(0.79, 3.0), ended(std::nan(""), 50.0)}, record);
+  EXPECT_FALSE(record.rival.has_value());
+  set_rival(*small.problem, {record, ended(0.6, 60.0), ended(0.68, 30.0)}, record);
+  ASSERT_TRUE(record.rival.has_value());
+  EXPECT_NEAR(record.rival->apart_mm, 30.0, 1e-9);
+  EXPECT_NEAR(record.rival->share, 0.85, 1e-12);
+  EXPECT_EQ(verdict_of(record), Verdict::Found);
+  set_rival(*small.problem, {record, ended(0.76, 30.0)}, record);
+  EXPECT_EQ(verdict_of(record), Verdict::Doubtful);
+  EXPECT_THAT(
+      judgement_of(record).reason,
+      ::testing::HasSubstr(
+          "ambiguous: an end 30 mm from here reaches 95 % of its similarity; but for that"));
+}
+
+TEST(Judgement, TheBestRecordIsFoundAndMostAlike) {
+  std::vector<RegistrationRecord> records;
+  for (const auto& [confidence, similarity] :
+       {std::pair(0.01, 0.9), {0.5, 0.6}, {0.999, 0.7}, {0.999, 0.7}, {0.999, std::nan("")}}) {
+    records.push_back(record_with(confidence));
+    records.back().result.similarity = similarity;
+    records.back().start_index = static_cast<std::int64_t>(records.size());
+  }
+  EXPECT_EQ(best_record(records), 2u) << "one that is not found is worse, the first of equal ones "
+                                         "is better";
+}
+
 // Without it the confidence is a lower bound.
 TEST(Judgement, WithoutAPredictedTreRejectsNothing) {
   RegistrationRecord record = record_with(0.012);
