@@ -102,17 +102,17 @@ std::int64_t EdgeImage::energy(int column, int row, int width, int height) const
 
 void correlate(const EdgeImage& pattern,
                const EdgeImage& image,
-               int first_column,
-               int first_row,
-               int columns,
-               int rows,
+               const ShiftWindow& window,
                std::span<float> likeness) {
   const int width = pattern.width();
   const int height = pattern.height();
+  const auto& [first_column, first_row, columns, rows] = window;
   check(first_column >= 0 && first_row >= 0 &&
             first_column + columns + width - 1 <= image.width() &&
             first_row + rows + height - 1 <= image.height(),
         "a pattern must stay within the image");
+  check(likeness.size() == window.size(), "there is a likeness for every shift");
+  check(width * height <= EdgeImage::kMostPixels, "sums of a larger pattern may overflow");
   std::vector<std::int32_t> products(likeness.size());
   const auto kernel = select_kernel<CorrelateEdges>(
       kernels_128::correlate_edges, kernels_256::correlate_edges, kernels_512::correlate_edges);

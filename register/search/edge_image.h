@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -16,7 +17,7 @@ class EdgeImage {
  public:
   /// Kept so small that sums over 8000 pixels fit into 32 bits.
   static constexpr int kLargestEdge = 255;
-  static constexpr std::size_t kMostPixels = 8000;
+  static constexpr int kMostPixels = 8000;
 
   EdgeImage() = default;
   /// Edges are 0 where the gradient would look at a pixel that is not used (`used`: one per pixel,
@@ -40,18 +41,26 @@ class EdgeImage {
   std::vector<std::int64_t> energy_sums_;  ///< over all pixels above and to the left
 };
 
-/// How alike a pattern is to an image where it lies on it at every shift of a rectangle: scalar
-/// products over the roots of both energies, from -1 to 1, row by row. Where the image shows less
-/// than a quarter of its mean energy, that quarter counts instead, so that the chance likeness of a
-/// few edges does not win. `first_column`, `first_row`: of the image, where the pattern's first
-/// pixel lies at the first shift; the pattern stays within the image.
+/// The shifts at which a pattern is compared: where its first pixel lies in the image.
+struct ShiftWindow {
+  int first_column = 0;
+  int first_row = 0;
+  int columns = 0;
+  int rows = 0;
+
+  [[nodiscard]] std::size_t size() const {
+    return static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
+  }
+};
+
+/// How alike a pattern is to an image at every shift of a window: scalar products over the roots of
+/// both energies, from -1 to 1, row by row. Where the image shows less than a quarter of its mean
+/// energy, that quarter counts instead, so that the chance likeness of a few edges does not win.
+/// The pattern stays within the image, and `likeness` has as many values as there are shifts.
 /// \test EdgeCorrelation.FindsAPatternWhereItWasCutOut
 void correlate(const EdgeImage& pattern,
                const EdgeImage& image,
-               int first_column,
-               int first_row,
-               int columns,
-               int rows,
+               const ShiftWindow& window,
                std::span<float> likeness);
 
 }  // namespace af::registration

@@ -4,16 +4,15 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <numbers>
 #include <span>
 #include <utility>
 
 #include "base/error.h"
 #include "geometry/tre.h"
-#include "register/method/prepared_stage.h"
-#include "register/search/edge_image.h"
+#include "register/method/registration_options.h"
 #include "register/search/rotation_set.h"
+#include "register/search/searched_view.h"
 
 namespace af::registration {
 namespace {
@@ -25,8 +24,6 @@ constexpr int kPixelsAcross = 64;
 constexpr int kFirstPixelsAcross = 32;
 /// Modes of the first look that are looked at again, from nearby rotations.
 constexpr std::size_t kFirstModes = 8;
-/// Smallest coarse pixel, mm on the isocentre plane: registrations find the rest.
-constexpr double kLeastPixelMm = 2.0;
 /// How far, in coarse pixels, points at the middle distance from the centre may move between
 /// neighbouring rotations. An edge that lies a pixel aside still overlaps, because edges are two to
 /// three pixels wide.
@@ -116,208 +113,6 @@ void add_rotations_about(const RigidTransform& room_from_ct,
         rotations.emplace_back(rotation_from_angles({x, y, z}) * room_from_ct.linear());
 }
 
-/// A view's renderer whose blur is the largest below a coarse pixel.
-struct CoarseRenderer {
-  std::shared_ptr<const DrrRenderer> renderer;
-  double blur_sigma_mm = 0.0;
-};
-
-CoarseRenderer coarse_renderer(const RegistrationView& view, double pixel_mm) {
-  CoarseRenderer chosen{view.renderer, 0.0};
-  for (const RendererLevel& level : view.coarse_levels)
-    if (level.blur_sigma_mm <= pixel_mm) chosen = {level.renderer, level.blur_sigma_mm};
-  return chosen;
-}
-
-/// Numbers first, first + step, ... up to last, at least one.
-struct Steps {
-  double first = 0.0;
-  double step = 0.0;
-  int count = 1;
-
-  Steps(double low, double high, double widest)
-      : count(1 + static_cast<int>(std::ceil((high - low) / widest - 1e-9))) {
-    step = count > 1 ? (high - low) / (count - 1) : 0.0;
-    first = count > 1 ? low : 0.5 * (low + high);
-  }
-  [[nodiscard]] double at(int i) const { return first + i * step; }
-};
-
-/// The lattice of translations.
-struct Lattice {
-  std::array<Steps, 3> axes;
-
-  Lattice(const MotionRange& range, double step_mm)
-      : axes{Steps(range.low.translation_mm.x(), range.high.translation_mm.x(), step_mm),
-             Steps(range.low.translation_mm.y(), range.high.translation_mm.y(), step_mm),
-             Steps(range.low.translation_mm.z(), range.high.translation_mm.z(), step_mm)} {}
-
-  [[nodiscard]] std::size_t size() const {
-    return static_cast<std::size_t>(axes[0].count) * static_cast<std::size_t>(axes[1].count) *
-           static_cast<std::size_t>(axes[2].count);
-  }
-  /// z is slowest.
-  [[nodiscard]] std::array<int, 3> node(std::size_t index) const {
-    const auto nx = static_cast<std::size_t>(axes[0].count);
-    const auto ny = static_cast<std::size_t>(axes[1].count);
-    return {static_cast<int>(index % nx),
-            static_cast<int>(index / nx % ny),
-            static_cast<int>(index / (nx * ny))};
-  }
-  [[nodiscard]] Eigen::Vector3d translation(std::size_t index) const {
-    const std::array<int, 3> at = node(index);
-    return {axes[0].at(at[0]), axes[1].at(at[1]), axes[2].at(at[2])};
-  }
-  /// Whether no neighbour along an axis has a larger value.
-  [[nodiscard]] bool is_maximum(std::span<const float> values, std::size_t index) const {
-    const std::array<int, 3> at = node(index);
-    std::size_t stride = 1;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      if (at[axis] > 0 && values[index - stride] > values[index]) return false;
-      if (at[axis] + 1 < axes[axis].count && values[index + stride] > values[index]) return false;
-      stride *= static_cast<std::size_t>(axes[axis].count);
-    }
-    return true;
-  }
-};
-
-/// Where a translation is seen: which correlations, and where in them.
-struct Place {
-  int layer = 0;
-  std::uint32_t pixel = 0;  ///< left and above of it
-  float right = 0.0f;       ///< from there, in coarse pixels
-  float below = 0.0f;
-};
-
-/// One view of the search.
-struct SearchedView {
-  View pattern;  ///< coarse: what a DRR shows
-  std::shared_ptr<const DrrRenderer> renderer;
-  EdgeImage xray;
-  Eigen::Vector3d along_beam;  ///< room: unit, from the source to the nominal centre
-  Steps depths{0.0, 0.0, 1.0};
-  int first_column = 0;  ///< of the first shift, in `xray`
-  int first_row = 0;
-  int columns = 1;  ///< shifts
-  int rows = 1;
-  std::vector<Place> places;  ///< of the lattice's translations
-
-  [[nodiscard]] std::size_t shifts() const {
-    return static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
-  }
-};
-
-/// Coarse pixels of about so many across, mm on the isocentre plane: the same in all views, as the
-/// widest needs them.
-double pixel_mm_of(const RegistrationProblem& problem, int pixels_across) {
-  double pixel_mm = kLeastPixelMm;
-  for (const RegistrationView& view : problem.views) {
-    const RegionOfInterest roi = view.widest_view().roi;
-    const double mm =
-        std::max(roi.width, roi.height) / view.view.camera.pixels_per_mm(problem.isocenter_point);
-    pixel_mm = std::max(pixel_mm, mm / pixels_across);
-  }
-  return pixel_mm;
-}
-
-View coarse_whole(const CameraGeometry& camera, const StageGrid& grid) {
-  return stage_view(View::whole_detector(camera), grid);
-}
-
-/// Where, in coarse pixels of the X-ray, the pattern's first pixel lies when the centre is seen
-/// where a translation puts it.
-Eigen::Vector2d shift_of(const View& pattern,
-                         const View& whole,
-                         const Eigen::Vector3d& nominal_center,
-                         const Eigen::Vector3d& translation) {
-  return whole.camera.project(nominal_center + translation) -
-         pattern.camera.project(nominal_center);
-}
-
-double depth_of(const SearchedView& view, const Eigen::Vector3d& translation) {
-  return view.along_beam.dot(translation);
-}
-
-int nearest_layer(const Steps& depths, double depth) {
-  if (depths.count == 1) return 0;
-  const double place = (depth - depths.first) / depths.step;
-  return static_cast<int>(std::lround(std::clamp(place, 0.0, depths.count - 1.0)));
-}
-
-/// Everything that does not depend on the rotation. `center`: room, at zero parameters.
-SearchedView searched_view(const RegistrationProblem& problem,
-                           const Eigen::Vector3d& center,
-                           const RegistrationView& view,
-                           const Lattice& lattice,
-                           int pixel_step,
-                           double pixel_mm) {
-  const CoarseRenderer coarse = coarse_renderer(view, pixel_mm);
-  const CameraGeometry& camera = view.view.camera;
-  const double blur_px = coarse.blur_sigma_mm * camera.pixels_per_mm(problem.isocenter_point);
-  const StageGrid grid{pixel_step, 1.0, blur_px};
-  const View whole = coarse_whole(camera, grid);
-  SearchedView searched{.pattern = stage_view(view.widest_view(), grid),
-                        .renderer = coarse.renderer,
-                        .xray = {},
-                        .along_beam = {},
-                        .places = {}};
-  searched.along_beam = (center - camera.source_point).normalized();
-
-  const std::size_t count = lattice.size();
-  std::vector<Eigen::Vector2d> shifts(count);
-  Eigen::Vector2d low = Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity());
-  Eigen::Vector2d high = -low;
-  double nearest = std::numeric_limits<double>::infinity();
-  double farthest = -nearest;
-  for (std::size_t i = 0; i < count; ++i) {
-    const Eigen::Vector3d translation = lattice.translation(i);
-    shifts[i] = shift_of(searched.pattern, whole, center, translation);
-    low = low.cwiseMin(shifts[i]);
-    high = high.cwiseMax(shifts[i]);
-    nearest = std::min(nearest, depth_of(searched, translation));
-    farthest = std::max(farthest, depth_of(searched, translation));
-  }
-  const Eigen::Vector2i first = low.array().floor().cast<int>();
-  const Eigen::Vector2i last = high.array().floor().cast<int>() + 1;
-  searched.columns = last.x() - first.x() + 1;
-  searched.rows = last.y() - first.y() + 1;
-  const int width = searched.pattern.roi.width;
-  const int height = searched.pattern.roi.height;
-  const int border = std::max({0,
-                               -first.x(),
-                               -first.y(),
-                               last.x() + width - whole.roi.width,
-                               last.y() + height - whole.roi.height});
-  searched.first_column = first.x() + border;
-  searched.first_row = first.y() + border;
-  const SimilarityReference seen =
-      stage_reference(view.xray, view.mask, View::whole_detector(camera), grid);
-  searched.xray = EdgeImage(seen.xray, seen.used, border);
-  if (!(searched.xray.mean_energy() > 0.0))
-    throw InputError(view_name(view) + "X-ray", "no edges", "a search needs an image of something");
-
-  // At half the pattern's width from its middle, sizes change by a pixel over this depth.
-  const double half_mm = 0.5 * pixel_mm * std::max(width, height);
-  const double layer_mm = 2.0 * pixel_mm * (center - camera.source_point).norm() / half_mm;
-  const int layers = std::max(1, static_cast<int>(std::ceil((farthest - nearest) / layer_mm)));
-  const double thickness = (farthest - nearest) / layers;
-  searched.depths =
-      Steps(nearest + 0.5 * thickness, farthest - 0.5 * thickness, std::max(thickness, 1e-3));
-
-  searched.places.resize(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    const Eigen::Vector2d at = shifts[i] - first.cast<double>();
-    const Eigen::Vector2d corner = at.array().floor();
-    searched.places[i] = {
-        nearest_layer(searched.depths, depth_of(searched, lattice.translation(i))),
-        static_cast<std::uint32_t>(corner.y()) * static_cast<std::uint32_t>(searched.columns) +
-            static_cast<std::uint32_t>(corner.x()),
-        static_cast<float>(at.x() - corner.x()),
-        static_cast<float>(at.y() - corner.y())};
-  }
-  return searched;
-}
-
 /// A place of the search that no neighbour beats.
 struct Maximum {
   float likeness = 0.0f;
@@ -344,7 +139,7 @@ struct Looking {
   const RegistrationProblem& problem;
   PoseFrame frame;  ///< of the searched range
   double rotation_step_rad;
-  Lattice lattice;
+  TranslationLattice lattice;
   std::vector<SearchedView> views;
 
   Looking(const RegistrationProblem& registered, const MotionLimit& searched, int pixels_across);
@@ -376,12 +171,8 @@ Looking::Looking(const RegistrationProblem& registered,
       rotation_step_rad(kPixelsPerRotation * 2.0 * std::numbers::sqrt2 / pixels_across),
       lattice(searched.range, pixel_mm_of(registered, pixels_across)) {
   const double pixel_mm = pixel_mm_of(registered, pixels_across);
-  for (const RegistrationView& view : problem.views) {
-    const double pixels_per_mm = view.view.camera.pixels_per_mm(problem.isocenter_point);
-    const int step = std::max(1, static_cast<int>(std::lround(pixel_mm * pixels_per_mm)));
-    views.push_back(
-        searched_view(problem, frame.center_room_mm, view, lattice, step, step / pixels_per_mm));
-  }
+  for (const RegistrationView& view : problem.views)
+    views.push_back(searched_view(problem, frame.center_room_mm, view, lattice, pixel_mm));
 }
 
 void Looking::add_view(std::size_t view, const Eigen::Matrix3d& rotation, Scratch& scratch) const {
@@ -399,21 +190,10 @@ void Looking::add_view(std::size_t view, const Eigen::Matrix3d& rotation, Scratc
     correlate(
         EdgeImage(scratch.drr, {}, 0),
         seen.xray,
-        seen.first_column,
-        seen.first_row,
-        seen.columns,
-        seen.rows,
+        seen.shift_window,
         std::span(scratch.likeness).subspan(static_cast<std::size_t>(layer) * shifts, shifts));
   }
-  const auto columns = static_cast<std::size_t>(seen.columns);
-  for (std::size_t i = 0; i < scratch.sums.size(); ++i) {
-    const Place& place = seen.places[i];
-    const float* const at =
-        scratch.likeness.data() + static_cast<std::size_t>(place.layer) * shifts + place.pixel;
-    const float above = at[0] + place.right * (at[1] - at[0]);
-    const float under = at[columns] + place.right * (at[columns + 1] - at[columns]);
-    scratch.sums[i] += above + place.below * (under - above);
-  }
+  seen.add_likeness(scratch.likeness, scratch.sums);
 }
 
 std::vector<Maximum> Looking::maxima(const Eigen::Matrix3d& rotation,

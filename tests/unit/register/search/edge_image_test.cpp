@@ -80,7 +80,7 @@ TEST(EdgeCorrelation, IsTheSumOfProductsOnEveryVectorWidth) {
   for (const VectorWidth width : supported_vector_widths()) {
     force_vector_width(width);
     std::vector<float> likeness(kColumns * kRows);
-    correlate(pattern, image, 2, 5, kColumns, kRows, likeness);
+    correlate(pattern, image, {2, 5, kColumns, kRows}, likeness);
     for (int row = 0; row < kRows; ++row)
       for (int column = 0; column < kColumns; ++column) {
         const double floor = 0.25 * image.mean_energy() * 21 * 13;
@@ -101,7 +101,7 @@ TEST(EdgeCorrelation, FindsAPatternWhereItWasCutOut) {
   constexpr int kColumns = 30;
   constexpr int kRows = 26;
   std::vector<float> likeness(kColumns * kRows);
-  correlate(pattern, edges, 0, 0, kColumns, kRows, likeness);
+  correlate(pattern, edges, {0, 0, kColumns, kRows}, likeness);
   const auto best = std::max_element(likeness.begin(), likeness.end()) - likeness.begin();
   EXPECT_EQ(best % kColumns, 13 + 6);
   EXPECT_EQ(best / kColumns, 9 + 6);

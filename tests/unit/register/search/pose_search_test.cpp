@@ -145,6 +145,15 @@ TEST(PoseSearch, RefusesAnXrayThatShowsNothing) {
   EXPECT_THAT(refusal(*small.problem, {}), HasSubstr("view 'LAT'"));
 }
 
+TEST(PoseSearch, RefusesTranslationsThatCannotBe) {
+  const test::SmallCase small = small_case_at({});
+  PoseSearchOptions options;
+  options.translation_mm = {0.0, 700.0, 0.0};
+  EXPECT_THAT(refusal(*small.problem, options), HasSubstr("must not bring the CT to the source"));
+  options.translation_mm = {900.0, 900.0, 900.0};
+  EXPECT_THAT(refusal(*small.problem, options), HasSubstr("four million translations"));
+}
+
 TEST(PoseSearchOptions, NamesEverythingThatIsWrong) {
   PoseSearchOptions options;
   options.rotation_deg = {10.0, -1.0, 181.0};
