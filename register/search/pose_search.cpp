@@ -100,6 +100,12 @@ std::vector<Eigen::Matrix3d> searched_rotations(const PoseSearchOptions& options
   std::vector<Eigen::Matrix3d> rotations;
   for (const Eigen::Matrix3d& from : turned)
     for (const Eigen::Matrix3d& by : moved) rotations.emplace_back(by * from);
+  constexpr std::size_t kMostRotations = 20000;
+  if (rotations.size() > kMostRotations)
+    throw InputError("--search-rotation-deg",
+                     searched.range.text(),
+                     "asks for " + std::to_string(rotations.size()) +
+                         " rotations: --search-orientations any needs fewer");
   return rotations;
 }
 

@@ -152,6 +152,9 @@ TEST(PoseSearch, RefusesTranslationsThatCannotBe) {
   EXPECT_THAT(refusal(*small.problem, options), HasSubstr("must not bring the CT to the source"));
   options.translation_mm = {900.0, 900.0, 900.0};
   EXPECT_THAT(refusal(*small.problem, options), HasSubstr("four million translations"));
+  options = {};
+  options.rotation_deg = {180.0, 180.0, 180.0};
+  EXPECT_THAT(refusal(*small.problem, options), HasSubstr("any needs fewer"));
 }
 
 TEST(PoseSearchOptions, NamesEverythingThatIsWrong) {
