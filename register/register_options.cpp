@@ -108,6 +108,8 @@ std::vector<std::string> problems(const RegisterOptions& options) {
   if (options.correction.is_wanted && options.renderer == "raycast")
     found.emplace_back(kCorrectsRayCasting);
   for (const std::string& text : problems(options.search)) found.push_back(text);
+  if (options.start != "search" && options.search != PoseSearchOptions{})
+    found.emplace_back("--search-... = set: must not be given without --start search");
   for (const std::string& text : field_problems(options)) found.push_back(text);
   return found;
 }

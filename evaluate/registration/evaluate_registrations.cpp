@@ -78,10 +78,13 @@ json repeat_json(const RegistrationStudyOptions& options) {
   if (!options.poses_from.empty()) return nullptr;
   const std::filesystem::path folder =
       std::filesystem::absolute(options.output_folder).lexically_normal();
+  const std::string starts =
+      options.start_rule == "search"
+          ? " --start-rule search"
+          : " --starts-from " + shell_quoted((folder / "starts.csv").string());
   return {{"command",
            "cd " + shell_quoted(std::filesystem::current_path().string()) + " && " +
-               options.program + " registration" + options.shared_by_repeats + " --starts-from " +
-               shell_quoted((folder / "starts.csv").string())},
+               options.program + " registration" + options.shared_by_repeats + starts},
           {"renderer", options.renderer},
           {"output", (folder / "repeats").string()}};
 }
@@ -327,6 +330,10 @@ std::vector<std::string> problems(const RegistrationStudyOptions& options) {
   std::vector<std::string> found = problems(options.start_options());
   append_problems(options, found);
   for (const std::string& text : problems(options.search)) found.push_back(text);
+  if (options.start_rule == "search" && !options.starts_from.empty())
+    found.emplace_back("--start-rule = search: must not be given with --starts-from");
+  if (options.start_rule != "search" && options.search != registration::PoseSearchOptions{})
+    found.emplace_back("--search-... = set: must not be given without --start-rule search");
   for (const std::string& text : field_problems(options)) found.push_back(text);
   const auto require_part = [&](const char* name, const std::optional<int>& part, int whole) {
     if (part.has_value() && !(*part >= 1 && *part <= whole))

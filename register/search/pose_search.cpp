@@ -33,8 +33,8 @@ constexpr double kUsualRotationRad = 20.0 * kRadPerDeg;
 constexpr double kUsualTranslationMm = 40.0;
 /// Maxima of one rotation that are kept: more only repeat each other.
 constexpr std::size_t kMaximaPerRotation = 8;
-/// Modes lie at least this far from each other, mean over the target box: registrations that start
-/// nearer end at the same pose.
+/// Modes lie at least this far from each other: registrations that start nearer end at the same
+/// pose.
 constexpr double kModesApartMm = 20.0;
 
 /// What both ranges hold.
@@ -45,13 +45,28 @@ MotionRange common_part(const MotionRange& a, const MotionRange& b) {
            a.high.translation_mm.cwiseMin(b.high.translation_mm)}};
 }
 
+/// A range relative to another frame of the same orientation. InputError for other frames.
+MotionRange seen_from(const PoseFrame& frame, const MotionLimit& limit) {
+  if (!limit.frame.rotation.isApprox(frame.rotation, 1e-6) ||
+      !limit.frame.center_ct_mm.isApprox(frame.center_ct_mm, 1e-6))
+    throw InputError("--start",
+                     "search",
+                     "the fields' nominal poses differ in rotation or centre: --renderer raycast "
+                     "searches without them");
+  MotionRange range = limit.range;
+  const Eigen::Vector3d apart = limit.frame.center_room_mm - frame.center_room_mm;
+  range.low.translation_mm += apart;
+  range.high.translation_mm += apart;
+  return range;
+}
+
 /// Where all fields hold poses, relative to the first one's frame; none without fields.
 std::optional<MotionLimit> reach_of_fields(const RegistrationProblem& problem) {
   std::optional<MotionLimit> reach;
   for (const RegistrationView& view : problem.views) {
     if (!view.reach.has_value()) continue;
     if (reach.has_value())
-      reach->range = common_part(reach->range, view.reach->range);
+      reach->range = common_part(reach->range, seen_from(reach->frame, *view.reach));
     else
       reach = view.reach;
   }
@@ -157,6 +172,8 @@ struct Looking {
     moved.center_room_mm += translation;
     return moved.nominal_room_from_ct();
   }
+  /// The middle of the lattice, about which depths are counted.
+  [[nodiscard]] Eigen::Vector3d middle() const { return lattice.middle(); }
   /// Adds how alike a view is at every translation.
   void add_view(std::size_t view, const Eigen::Matrix3d& rotation, Scratch& scratch) const;
   /// The best maxima of one rotation, whose index they get.
@@ -189,15 +206,18 @@ void Looking::add_view(std::size_t view, const Eigen::Matrix3d& rotation, Scratc
   scratch.drr.height = seen.pattern.roi.height;
   scratch.drr.pixels.resize(seen.pattern.pixel_count());
   for (int layer = 0; layer < seen.depths.count; ++layer) {
-    seen.renderer->render(pose(rotation, seen.depths.at(layer) * seen.along_beam),
-                          seen.pattern,
-                          *scratch.workspaces[view],
-                          scratch.drr.pixels);
-    correlate(
-        EdgeImage(scratch.drr, {}, 0),
-        seen.xray,
-        seen.shift_window,
-        std::span(scratch.likeness).subspan(static_cast<std::size_t>(layer) * shifts, shifts));
+    const std::span<float> likeness =
+        std::span(scratch.likeness).subspan(static_cast<std::size_t>(layer) * shifts, shifts);
+    const RenderStatus status =
+        seen.renderer->render(pose(rotation, middle() + seen.depths.at(layer) * seen.along_beam),
+                              seen.pattern,
+                              *scratch.workspaces[view],
+                              scratch.drr.pixels);
+    // Where a field lacks rays, their zeros would be edges.
+    if (status.is_inside())
+      correlate(EdgeImage(scratch.drr, {}, 0), seen.xray, seen.shift_window, likeness);
+    else
+      std::ranges::fill(likeness, 0.0f);
   }
   seen.add_likeness(scratch.likeness, scratch.sums);
 }
@@ -240,15 +260,13 @@ std::vector<PoseMode> Looking::modes(const std::vector<Eigen::Matrix3d>& rotatio
   std::sort(
       all.begin(), all.end(), [](const Maximum& a, const Maximum& b) { return a.is_before(b); });
 
-  const std::vector<Eigen::Vector3d>& points =
-      problem.target_points_ct.empty() ? problem.scaling_points_ct : problem.target_points_ct;
   std::vector<PoseMode> found;
   for (const Maximum& maximum : all) {
-    if (found.size() == count) break;
+    if (found.size() == count || maximum.likeness <= 0.0f) break;
     const RigidTransform here =
         pose(rotations[maximum.rotation], lattice.translation(maximum.translation));
     const bool is_apart = std::all_of(found.begin(), found.end(), [&](const PoseMode& likelier) {
-      return mean_tre_mm(here, likelier.room_from_ct, points) >= kModesApartMm;
+      return are_apart(problem, here, likelier.room_from_ct, kModesApartMm);
     });
     if (is_apart) found.push_back({here, static_cast<double>(maximum.likeness)});
   }
@@ -306,13 +324,39 @@ std::vector<std::string> problems(const PoseSearchOptions& options) {
 }
 
 int coarsest_level(const PoseSearchOptions& options) {
-  return options.orientations == "any" ? kCoarsestLevel : 0;
+  return options.orientations == "any" ? kCoarsestLevel : kCoarsestLevel - 1;
+}
+
+double seen_distance_mm(const RegistrationProblem& problem,
+                        const RigidTransform& a,
+                        const RigidTransform& b) {
+  const std::vector<Eigen::Vector3d>& points =
+      problem.target_points_ct.empty() ? problem.scaling_points_ct : problem.target_points_ct;
+  if (problem.views.size() > 1) return mean_tre_mm(a, b, points);
+  const CameraGeometry& camera = problem.views.front().view.camera;
+  double sum_mm = 0.0;
+  for (const Eigen::Vector3d& point : points) {
+    const Eigen::Vector3d beam = (a * point - camera.source_point).normalized();
+    const Eigen::Vector3d apart = b * point - a * point;
+    sum_mm += (apart - beam.dot(apart) * beam).norm();
+  }
+  return sum_mm / static_cast<double>(points.size());
+}
+
+bool are_apart(const RegistrationProblem& problem,
+               const RigidTransform& a,
+               const RigidTransform& b,
+               double distance_mm) {
+  constexpr double kTurnedRad = 30.0 * kRadPerDeg;
+  return seen_distance_mm(problem, a, b) >= distance_mm ||
+         rotation_angle_between_rad(a, b) >= kTurnedRad;
 }
 
 PoseSearch::PoseSearch(const RegistrationProblem& problem,
                        const PoseSearchOptions& options,
                        std::shared_ptr<ThreadPool> threads) {
   throw_if_any(problems(options));
+  throw_if_any(problems(problem));
   const MotionLimit searched = searched_range(problem, options);
   const bool is_everywhere = options.orientations == "any";
   std::optional<Looking> first;
@@ -343,12 +387,18 @@ std::size_t PoseSearch::rotation_count() const {
 std::vector<PoseMode> PoseSearch::modes() const {
   const auto count = static_cast<std::size_t>(parts_->options.modes);
   ThreadPool& threads = *parts_->threads;
-  if (!parts_->first.has_value()) return parts_->looking.modes(parts_->rotations, count, threads);
   std::vector<Eigen::Matrix3d> rotations;
-  for (const PoseMode& mode :
-       parts_->first->modes(parts_->rotations, std::max(count, kFirstModes), threads))
-    add_rotations_about(mode.room_from_ct, parts_->looking.rotation_step_rad, rotations);
-  return parts_->looking.modes(rotations, count, threads);
+  if (parts_->first.has_value())
+    for (const PoseMode& mode :
+         parts_->first->modes(parts_->rotations, std::max(count, kFirstModes), threads))
+      add_rotations_about(mode.room_from_ct, parts_->looking.rotation_step_rad, rotations);
+  std::vector<PoseMode> modes = parts_->looking.modes(
+      parts_->first.has_value() ? rotations : parts_->rotations, count, threads);
+  if (modes.empty())
+    throw InputError("--start",
+                     "search",
+                     "no DRR within " + parts_->searched.range.text() + " is like the X-rays");
+  return modes;
 }
 
 }  // namespace af::registration

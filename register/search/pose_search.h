@@ -24,12 +24,26 @@ struct PoseSearchOptions {
   std::optional<std::array<double, 3>> translation_mm;
 
   void describe(Fields& field);
+  bool operator==(const PoseSearchOptions&) const = default;
 };
 
 std::vector<std::string> problems(const PoseSearchOptions& options);
 
-/// Of the image pyramids: the level whose blur suits the first look at all rotations; 0 without.
+/// Of the image pyramids: the level that the search needs, whatever stages need.
 int coarsest_level(const PoseSearchOptions& options);
+
+/// How far apart two poses put the target, mean over its points, mm. With one view, which hardly
+/// shows depth, only across the beam.
+double seen_distance_mm(const RegistrationProblem& problem,
+                        const RigidTransform& a,
+                        const RigidTransform& b);
+
+/// Whether two poses are not one place: so far apart, or turned by 30 degrees or more, which moves
+/// a small target little. \test PoseSearch.ModesOfASmallTargetDifferByTheirRotation
+bool are_apart(const RegistrationProblem& problem,
+               const RigidTransform& a,
+               const RigidTransform& b,
+               double distance_mm);
 
 /// A pose at which DRRs are like the X-rays, and how much: the mean over views of a correlation,
 /// at most 1.
@@ -47,8 +61,8 @@ struct PoseMode {
 /// threads or vector width. \test PoseSearch.FindsAPoseAnywhereInItsRange
 class PoseSearch {
  public:
-  /// The problem must outlive it. InputError where the options ask for poses that a view's field
-  /// does not hold, or an X-ray shows nothing.
+  /// The problem must outlive it. InputError where the problem has problems, the options ask for
+  /// poses that a view's field does not hold, or an X-ray shows nothing.
   PoseSearch(const RegistrationProblem& problem,
              const PoseSearchOptions& options,
              std::shared_ptr<ThreadPool> threads = nullptr);
@@ -56,8 +70,8 @@ class PoseSearch {
   PoseSearch(PoseSearch&&) noexcept;
   PoseSearch& operator=(PoseSearch&&) noexcept;
 
-  /// At most PoseSearchOptions::modes, the likeliest first, each farther from every likelier one
-  /// than registrations usually reach.
+  /// At most PoseSearchOptions::modes, the likeliest first, each apart from every likelier one.
+  /// InputError when nothing is like the X-rays anywhere.
   [[nodiscard]] std::vector<PoseMode> modes() const;
 
   /// What was asked for, relative to the fields' nominal pose or, without fields, to the study's.

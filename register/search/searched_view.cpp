@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "register/method/prepared_stage.h"
+#include "register/problem/target_region.h"
 
 namespace af::registration {
 namespace {
@@ -35,7 +36,7 @@ CoarseRenderer coarse_renderer(const RegistrationView& view, double pixel_mm) {
 /// What the lattice's translations do in a view.
 struct SeenTranslations {
   std::vector<Eigen::Vector2d> shifts;  ///< of the pattern's first pixel, in coarse pixels
-  std::vector<double> depths;           ///< mm along the beam
+  std::vector<double> depths;           ///< mm along the beam, from the lattice's middle
   Eigen::Vector2i first;                ///< rounded down
   Eigen::Vector2i last;                 ///< beyond the last one
   double nearest = std::numeric_limits<double>::infinity();
@@ -60,12 +61,16 @@ SeenTranslations seen_translations(const RegistrationView& view,
   SeenTranslations seen;
   Eigen::Vector2d low = Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity());
   Eigen::Vector2d high = -low;
-  const Eigen::Vector2d in_pattern = searched.pattern.camera.project(center);
+  const Eigen::Vector3d middle = lattice.middle();
+  const Eigen::Vector2d in_pattern = searched.pattern.camera.project(center + middle);
+  // Sizes follow the depth along the detector's normal.
+  const Eigen::Vector3d normal = view.view.camera.beam_direction();
+  const double normal_share = normal.dot(searched.along_beam);
   for (std::size_t i = 0; i < lattice.size(); ++i) {
     const Eigen::Vector3d translation = lattice.translation(i);
     require_before_source(view, center, translation);
     seen.shifts.emplace_back(whole.camera.project(center + translation) - in_pattern);
-    seen.depths.push_back(searched.along_beam.dot(translation));
+    seen.depths.push_back(normal.dot(translation - middle) / normal_share);
     low = low.cwiseMin(seen.shifts.back());
     high = high.cwiseMax(seen.shifts.back());
     seen.nearest = std::min(seen.nearest, seen.depths.back());
@@ -82,7 +87,7 @@ Steps depth_layers(const SearchedView& searched,
                    const SeenTranslations& seen,
                    double source_distance_mm) {
   const double half_px = 0.5 * std::max(searched.pattern.roi.width, searched.pattern.roi.height);
-  const double layer_mm = 2.0 * source_distance_mm / half_px;
+  const double layer_mm = 2.0 * (source_distance_mm + seen.nearest) / half_px;
   const double range_mm = seen.farthest - seen.nearest;
   const int layers = std::max(1, static_cast<int>(std::ceil(range_mm / layer_mm)));
   const double thickness_mm = range_mm / layers;
@@ -106,7 +111,9 @@ std::vector<SearchedView::Place> places_of(const SeenTranslations& seen,
   std::vector<SearchedView::Place> places;
   for (std::size_t i = 0; i < seen.shifts.size(); ++i) {
     const Eigen::Vector2d at = seen.shifts[i] - seen.first.cast<double>();
-    const Eigen::Vector2d corner = at.array().floor();
+    // The last shift has no neighbour: rounding must not make it a corner.
+    const Eigen::Vector2d corner =
+        at.array().floor().min(Eigen::Array2d(window.columns - 2, window.rows - 2));
     places.push_back(
         {depths.nearest(seen.depths[i]),
          static_cast<std::uint32_t>(corner.y()) * static_cast<std::uint32_t>(window.columns) +
@@ -138,8 +145,7 @@ TranslationLattice::TranslationLattice(const MotionRange& range, double step_mm)
   if (count > kMostTranslations)
     throw InputError("search range",
                      range.text(),
-                     "must have at most four million translations, " +
-                         std::to_string(static_cast<int>(step_mm)) + " mm apart");
+                     "must have at most four million translations, a coarse pixel apart");
 }
 
 std::size_t TranslationLattice::size() const {
@@ -158,6 +164,15 @@ std::array<int, 3> TranslationLattice::node(std::size_t index) const {
 Eigen::Vector3d TranslationLattice::translation(std::size_t index) const {
   const std::array<int, 3> at = node(index);
   return {axes[0].at(at[0]), axes[1].at(at[1]), axes[2].at(at[2])};
+}
+
+Eigen::Vector3d TranslationLattice::middle() const {
+  Eigen::Vector3d middle;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Steps& steps = axes[static_cast<std::size_t>(axis)];
+    middle[axis] = 0.5 * (steps.at(0) + steps.at(steps.count - 1));
+  }
+  return middle;
 }
 
 bool TranslationLattice::is_maximum(std::span<const float> values, std::size_t index) const {
@@ -194,30 +209,51 @@ void SearchedView::add_likeness(std::span<const float> likeness, std::span<float
   }
 }
 
+namespace {
+
+/// What DRRs show of a view: twice the region, where the target is seen with the centre at the
+/// lattice's middle.
+View widest_view_at(const RegistrationProblem& problem,
+                    const RegistrationView& view,
+                    const Eigen::Vector3d& middle) {
+  if (middle.isZero(1e-9)) return view.widest_view();
+  RigidTransform moved = problem.nominal_room_from_ct;
+  moved.pretranslate(middle);
+  return View{view.view.camera, region_at(problem, view, moved)}.scaled(kWidestRegionScale);
+}
+
+/// Without the gold standard's markers, which no patient has.
+const Image2d& searched_mask(const RegistrationView& view) {
+  return view.mask_without_markers.pixels.empty() ? view.mask : view.mask_without_markers;
+}
+
+}  // namespace
+
 SearchedView searched_view(const RegistrationProblem& problem,
                            const Eigen::Vector3d& center,
                            const RegistrationView& view,
                            const TranslationLattice& lattice,
                            double pixel_mm) {
   const CameraGeometry& camera = view.view.camera;
+  const Eigen::Vector3d at_middle = center + lattice.middle();
   const double pixels_per_mm = camera.pixels_per_mm(problem.isocenter_point);
   const int pixel_step = std::max(1, static_cast<int>(std::ceil(pixel_mm * pixels_per_mm - 1e-6)));
   const CoarseRenderer coarse = coarse_renderer(view, pixel_step / pixels_per_mm);
   const StageGrid grid{pixel_step, 1.0, coarse.blur_sigma_mm * pixels_per_mm};
   const View whole = stage_view(View::whole_detector(camera), grid);
-  SearchedView searched{stage_view(view.widest_view(), grid),
+  SearchedView searched{stage_view(widest_view_at(problem, view, lattice.middle()), grid),
                         coarse.renderer,
                         {},
-                        (center - camera.source_point).normalized(),
+                        (at_middle - camera.source_point).normalized(),
                         {0.0, 0.0, 1.0},
                         {},
                         {}};
   const SeenTranslations seen = seen_translations(view, whole, searched, center, lattice);
-  searched.depths = depth_layers(searched, seen, (center - camera.source_point).norm());
+  searched.depths = depth_layers(searched, seen, (at_middle - camera.source_point).norm());
 
   const int border = border_for(seen, searched.pattern.roi, whole);
   const SimilarityReference xray =
-      stage_reference(view.xray, view.mask, View::whole_detector(camera), grid);
+      stage_reference(view.xray, searched_mask(view), View::whole_detector(camera), grid);
   searched.xray = EdgeImage(xray.xray, xray.used, border);
   if (!(searched.xray.mean_energy() > 0.0))
     throw InputError(view_name(view) + "X-ray", "no edges", "a search needs an image of something");

@@ -36,6 +36,7 @@ struct TranslationLattice {
 
   [[nodiscard]] std::size_t size() const;
   [[nodiscard]] Eigen::Vector3d translation(std::size_t index) const;
+  [[nodiscard]] Eigen::Vector3d middle() const;
   /// Whether no neighbour along an axis has a larger value.
   [[nodiscard]] bool is_maximum(std::span<const float> values, std::size_t index) const;
 
@@ -60,9 +61,9 @@ struct SearchedView {
   View pattern;  ///< coarse: what a DRR shows
   std::shared_ptr<const DrrRenderer> renderer;
   EdgeImage xray;
-  Eigen::Vector3d along_beam;  ///< room: unit, from the source to the centre
-  /// Of DRRs, mm along the beam from the centre: nearer and farther ones are seen larger and
-  /// smaller.
+  Eigen::Vector3d along_beam;  ///< room: unit, from the source to the centre at the middle
+  /// Of DRRs, mm along the beam from the lattice's middle: nearer and farther ones are seen larger
+  /// and smaller.
   Steps depths;
   ShiftWindow shift_window;   ///< of the pattern in `xray`
   std::vector<Place> places;  ///< of the lattice's translations

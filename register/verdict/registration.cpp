@@ -468,14 +468,10 @@ constexpr double kElsewhereMm = 10.0;
 /// tenth (kRivalShare).
 constexpr double kAmbiguousShare = 0.9;
 
-const std::vector<Eigen::Vector3d>& points_of(const RegistrationProblem& problem) {
-  return problem.target_points_ct.empty() ? problem.scaling_points_ct : problem.target_points_ct;
-}
-
 std::string ambiguity_text(const RivalEnd& rival) {
   return "ambiguous: an end " + std::to_string(std::lround(rival.apart_mm)) +
          " mm from here reaches " + std::to_string(std::lround(100.0 * rival.share)) +
-         " % of its similarity";
+         " % of what this one explains";
 }
 
 }  // namespace
@@ -572,6 +568,14 @@ RegistrationRecord Registration::run_everywhere(std::int64_t start_index) {
     records.push_back(run(mode.room_from_ct, start_index));
   RegistrationRecord best = records[best_record(records)];
   set_rival(*problem, records, best);
+  RegistrationResult& result = best.result;
+  result.evaluations = result.inadmissible = 0;
+  result.drr_count = 0;
+  for (const RegistrationRecord& record : records) {
+    result.evaluations += record.result.evaluations;
+    result.inadmissible += record.result.inadmissible;
+    result.drr_count += record.result.drr_count;
+  }
   best.result.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
   return best;
 }
@@ -637,14 +641,19 @@ void set_rival(const RegistrationProblem& problem,
                const std::vector<RegistrationRecord>& records,
                RegistrationRecord& record) {
   record.rival.reset();
-  if (!record.result.has_pose() || record.result.similarity <= 0.0) return;
+  // What the judge's level explains is 0 where nothing fits, whatever the method's own measure is.
+  const double explained = judge_summary(record.view_values).coarse.mean;
+  if (!(explained > 0.0)) return;
+  const RigidTransform& end = record.result.room_from_ct;
   for (const RegistrationRecord& other : records) {
-    if (!other.result.has_pose()) continue;
-    const double apart_mm =
-        mean_tre_mm(other.result.room_from_ct, record.result.room_from_ct, points_of(problem));
-    const double share = other.result.similarity / record.result.similarity;
-    if (apart_mm >= kElsewhereMm && (!record.rival.has_value() || share > record.rival->share))
-      record.rival = RivalEnd{apart_mm, share};
+    const RigidTransform& elsewhere = other.result.room_from_ct;
+    const double share = judge_summary(other.view_values).coarse.mean / explained;
+    if (!other.result.has_pose() || !std::isfinite(share) ||
+        judgement_of(other).verdict == Verdict::NotFound ||
+        !are_apart(problem, end, elsewhere, kElsewhereMm))
+      continue;
+    if (!record.rival.has_value() || share > record.rival->share)
+      record.rival = RivalEnd{seen_distance_mm(problem, end, elsewhere), share};
   }
 }
 

@@ -30,8 +30,8 @@ struct TargetErrors {
 
 /// Of the ends of other starts that lie elsewhere, the one that explains the X-rays best.
 struct RivalEnd {
-  double apart_mm = 0.0;  ///< from the end, mean over the target box
-  double share = 0.0;     ///< of the end's similarity
+  double apart_mm = 0.0;  ///< from the end: seen_distance_mm()
+  double share = 0.0;     ///< of what the end explains, ViewValue::coarse
 };
 
 /// One registration, and what is said about its end.
@@ -92,8 +92,8 @@ class Registration {
   /// search(), and what examiner and uncertainty say about its end.
   [[nodiscard]] RegistrationRecord run(const RigidTransform& start_room_from_ct,
                                        std::int64_t start_index = 0);
-  /// run() from every pose that the search finds. Returns the best record, with its rival and the
-  /// seconds of everything.
+  /// run() from every pose that the search finds. Returns the best record, with its rival, the
+  /// seconds of everything and the poses and DRRs of all registrations.
   [[nodiscard]] RegistrationRecord run_everywhere(std::int64_t start_index = 0);
   /// Looks into X-rays that do not fit the end of a record from run() (ViewDiagnoser).
   void diagnose(RegistrationRecord& record);
@@ -121,8 +121,9 @@ bool is_better(const RegistrationRecord& a, const RegistrationRecord& b);
 /// Index of the best record; `records` is not empty.
 std::size_t best_record(const std::vector<RegistrationRecord>& records);
 
-/// Sets the rival of a record among those of one problem: nothing where all others that have an end
-/// ended at the same place. \test Judgement.AnEndElsewhereThatIsAsAlikeLeavesADoubt
+/// Sets the rival of a record among those of one problem, which were examined: none where all
+/// others ended at the same place or are not found. \test
+/// Judgement.AnEndElsewhereThatIsAsAlikeLeavesADoubt
 void set_rival(const RegistrationProblem& problem,
                const std::vector<RegistrationRecord>& records,
                RegistrationRecord& record);

@@ -216,6 +216,8 @@ row 3 '--search-rotation-deg' 'search of negative angles' "$bin/af-register" --r
   --search-rotation-deg 5,-1,5 --study valid/study.toml
 row 3 'must be left out' 'search of all rotations within some' "$bin/af-register" --renderer raycast -o out/result --start search \
   --search-orientations any --search-rotation-deg 5,5,5 --study valid/study.toml
+row 3 'without --start search' 'options of a search without one' "$bin/af-register" --renderer raycast -o out/result \
+  --search-modes 3 --study valid/study.toml
 row 2 'search-orientations' 'search of unknown orientations' "$bin/af-register" --renderer raycast -o out/result --start search \
   --search-orientations upright --study valid/study.toml
 row 3 'landmarks' 'start from landmarks that no view shows' "$bin/af-register" --renderer raycast -o out/result --start landmarks \

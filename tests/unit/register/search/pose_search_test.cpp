@@ -82,6 +82,35 @@ TEST(PoseSearch, OneViewFindsWhatItShows) {
   EXPECT_LT(std::hypot(apart.x(), apart.z()), 8.0);
 }
 
+TEST(PoseSearch, FindsAPoseFarAlongABeamThroughASmallRegionAndAMask) {
+  // The region lies off the coarse grid; the sizes of what a view shows change over the range.
+  test::SmallCase small = small_case_at(PoseParameters::from_deg_and_mm({5, -4, 6, 6, 105, -7}));
+  for (RegistrationView& view : small.problem->views) view.view.roi = {9, 11, 27, 25};
+  RegistrationView& masked = small.problem->views[0];
+  masked.mask = Image2d(48, 48);
+  for (int row = 0; row < 48; ++row)
+    for (int column = 0; column < 48; ++column)
+      masked.mask.at(column, row) = column < 14 && row < 14 ? 0.0f : 1.0f;
+  PoseSearchOptions options;
+  options.translation_mm = {15.0, 130.0, 15.0};
+  const PoseSearch search(*small.problem, options);
+  EXPECT_LT(distance_mm(small, search.modes().front().room_from_ct), 10.0);
+}
+
+TEST(PoseSearch, ModesOfASmallTargetDifferByTheirRotation) {
+  const test::SmallCase small = small_case_at({});
+  const RigidTransform here = RigidTransform::Identity();
+  RigidTransform turned = here;
+  turned.rotate(Eigen::AngleAxisd(31.0 * kRadPerDeg, Eigen::Vector3d::UnitY()));
+  small.problem->target_points_ct = {{-2, 0, 0}, {2, 0, 0}};
+  EXPECT_TRUE(are_apart(*small.problem, here, turned, 20.0));
+  turned = here;
+  turned.rotate(Eigen::AngleAxisd(29.0 * kRadPerDeg, Eigen::Vector3d::UnitY()));
+  EXPECT_FALSE(are_apart(*small.problem, here, turned, 20.0));
+  turned.pretranslate(Eigen::Vector3d(0, 20, 0));
+  EXPECT_TRUE(are_apart(*small.problem, here, turned, 20.0));
+}
+
 TEST(PoseSearch, IsTheSameOnEveryVectorWidthAndNumberOfThreads) {
   const test::SmallCase small =
       small_case_at(PoseParameters::from_deg_and_mm({9, 8, -14, -10, 12, 3}));
@@ -111,9 +140,7 @@ TEST(PoseSearch, ModesAreApartAndInOrder) {
   for (std::size_t i = 0; i < modes.size(); ++i)
     for (std::size_t k = 0; k < i; ++k) {
       EXPECT_LE(modes[i].likeness, modes[k].likeness);
-      EXPECT_GE(mean_tre_mm(
-                    modes[i].room_from_ct, modes[k].room_from_ct, small.problem->scaling_points_ct),
-                20.0);
+      EXPECT_TRUE(are_apart(*small.problem, modes[i].room_from_ct, modes[k].room_from_ct, 20.0));
     }
 }
 
@@ -137,6 +164,14 @@ TEST(PoseSearch, RefusesPosesThatAFieldDoesNotHold) {
   options.orientations = "field";
   options.rotation_deg = {12.0, 5.0, 5.0};
   EXPECT_THAT(refusal(*small.problem, options), HasSubstr("+-10 degrees, +-20 mm"));
+  // A field whose nominal pose lies 30 mm aside holds less of the first one's range.
+  PoseFrame aside = small.problem->frame();
+  aside.center_room_mm.x() += 30.0;
+  small.problem->views[1].reach = MotionLimit{aside, MotionRange(10.0 * kRadPerDeg, 20.0)};
+  EXPECT_EQ(PoseSearch(*small.problem, {}).range().low.translation_mm.x(), 10.0);
+  aside.rotation = rotation_from_angles({0.1, 0.0, 0.0});
+  small.problem->views[1].reach = MotionLimit{aside, MotionRange(10.0 * kRadPerDeg, 20.0)};
+  EXPECT_THAT(refusal(*small.problem, {}), HasSubstr("nominal poses differ"));
 }
 
 TEST(PoseSearch, RefusesAnXrayThatShowsNothing) {

@@ -69,15 +69,17 @@ TEST(Judgement, SaysTheProbabilityAndWhatWasWanted) {
 
 TEST(Judgement, AnEndElsewhereThatIsAsAlikeLeavesADoubt) {
   const test::SmallCase small = test::small_case();
-  const auto ended = [](double similarity, double x_mm) {
-    RegistrationRecord record = record_with(0.9968);
-    record.result.similarity = similarity;
+  const auto ended = [](double explained, double x_mm) {
+    RegistrationRecord record = record_with(0.9968, {{explained, 0.9}, {explained, 0.9}});
+    record.result.similarity = 1.0 + explained;  // as of a measure that is never 0
     record.result.room_from_ct.translation().x() = x_mm;
     return record;
   };
   RegistrationRecord record = ended(0.8, 0.0);
-  // The same place, no end, and two places elsewhere.
-  set_rival(*small.problem, {record, ended(0.79, 3.0), ended(std::nan(""), 50.0)}, record);
+  RegistrationRecord not_found = ended(0.8, 50.0);
+  not_found.uncertainty.confidence = 0.01;
+  // The same place, an end that is none, and two places elsewhere.
+  set_rival(*small.problem, {record, ended(0.79, 3.0), not_found}, record);
   EXPECT_FALSE(record.rival.has_value());
   set_rival(*small.problem, {record, ended(0.6, 60.0), ended(0.68, 30.0)}, record);
   ASSERT_TRUE(record.rival.has_value());
@@ -89,7 +91,28 @@ TEST(Judgement, AnEndElsewhereThatIsAsAlikeLeavesADoubt) {
   EXPECT_THAT(
       judgement_of(record).reason,
       ::testing::HasSubstr(
-          "ambiguous: an end 30 mm from here reaches 95 % of its similarity; but for that"));
+          "ambiguous: an end 30 mm from here reaches 95 % of what this one explains; but for"));
+  // A quarter turn about a small target's middle moves it little.
+  RegistrationRecord turned = ended(0.76, 0.0);
+  turned.result.room_from_ct.rotate(Eigen::AngleAxisd(1.5, Eigen::Vector3d::UnitZ()));
+  set_rival(*small.problem, {record, turned}, record);
+  EXPECT_TRUE(record.rival.has_value());
+}
+
+TEST(Judgement, WithOneViewAnEndAtAnotherDepthIsNoRival) {
+  test::SmallCase small = test::small_case();
+  small.problem->views.resize(1);  // looks along y
+  const auto ended = [](const Eigen::Vector3d& translation) {
+    RegistrationRecord record = record_with(0.9968, {{0.8, 0.9}});
+    record.result.room_from_ct.translation() = translation;
+    return record;
+  };
+  RegistrationRecord record = ended({0, 0, 0});
+  // 25 mm of 650: points 40 mm aside move across the beam by 1.5 mm.
+  set_rival(*small.problem, {record, ended({0, 25, 0})}, record);
+  EXPECT_FALSE(record.rival.has_value());
+  set_rival(*small.problem, {record, ended({25, 0, 0})}, record);
+  EXPECT_TRUE(record.rival.has_value());
 }
 
 TEST(Judgement, TheBestRecordIsFoundAndMostAlike) {
