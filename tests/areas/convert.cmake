@@ -8,4 +8,4 @@ foreach(name cameras formats poses program)
 endforeach()
 add_test(NAME convert.mutations COMMAND /usr/bin/python3 -B test_mutations.py
          WORKING_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/convert)
-set_tests_properties(convert.mutations PROPERTIES LABELS programs TIMEOUT 300)
+set_tests_properties(convert.mutations PROPERTIES LABELS programs TIMEOUT 900)
