@@ -178,7 +178,7 @@ void find_starts(const RegisterOptions& options,
   });
 }
 
-/// README.md, "With or without fields", measures 14 registrations on a skull; a margin for finer
+/// README.md, "How it works", measures 14 registrations on a skull; a margin for finer
 /// fields.
 constexpr const char* kCastsWithoutFields =
     "renderer: raycast, as neither the study nor --field names a field. Fields (af-precompute) pay "
