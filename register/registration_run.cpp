@@ -21,6 +21,7 @@
 #include "files/options_toml.h"
 #include "files/output_file.h"
 #include "files/sha256.h"
+#include "files/shell_words.h"
 #include "geometry/target_box.h"
 #include "geometry/tre.h"
 #include "ranks/root_only.h"
@@ -221,6 +222,17 @@ void warn_of_clipped(const std::vector<RegistrationRecord>& records, const Commu
            ") and were clipped into it");
 }
 
+/// Says what comes next where the fields' range ends.
+void offer_search(const RegisterOptions& options,
+                  const RegistrationResult& best,
+                  const Communicator& world) {
+  if (best.pinned_along.empty() && best.clipped_along.empty()) return;
+  inform(world,
+         "beyond the fields' range: 'af-register " + shell_quoted(options.study.string()) +
+             " --renderer raycast --start search' looks for the pose there. Wider fields: "
+             "af-precompute --max-rotation-deg and --max-translation-mm");
+}
+
 void add_target_errors(const CaseToRegister& registered, std::vector<RegistrationRecord>& records) {
   if (!registered.gold.has_value()) return;
   const std::vector<Eigen::Vector3d> points = target_points(registered.study_case.target_box_ct);
@@ -247,6 +259,7 @@ void write_results(const RegisterOptions& options,
   registration.diagnose(best);
   warn_of(best.diagnosis.messages, world);
   warn_of_clipped(records, world);
+  offer_search(options, best.result, world);
   const Verdict verdict = judgement_of(best).verdict;
   const bool is_found = verdict != Verdict::NotFound;
   const RegistrationProblem& problem = *registration.problem;

@@ -577,6 +577,7 @@ TEST_F(RegisterProgram, AnEndWhereTheFieldsRangeEndsIsDoubtfulAndSaysAlongWhat) 
   EXPECT_EQ(found.at("stop_reason"), "pinned-at-limit");
   EXPECT_NE(found.at("verdict"), "found");
   EXPECT_NE(found.at("verdict_reason").get<std::string>().find(said), std::string::npos) << found;
+  EXPECT_NE(run.output.find("--renderer raycast --start search"), std::string::npos) << run.output;
 }
 
 TEST_F(RegisterProgram, RequireFoundDoesNotAcceptADoubtfulPose) {
