@@ -28,7 +28,7 @@ RegistrationRecord record_of(std::int64_t start_index, double similarity) {
 }
 
 RunDescription some_run() {
-  RunDescription run{"skull", "raycast", {}, {}};
+  RunDescription run{"skull", "raycast", {}, {}, {}};
   run.provenance.program = "af-register";
   run.provenance.command_line = "af-register --study s";
   return run;
