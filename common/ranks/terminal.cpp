@@ -16,7 +16,8 @@ void inform(const Communicator& communicator, const std::string& message) {
 void warn(const Communicator& communicator, const std::string& message) {
   // Every case, renderer or camera that reads a file finds the same oddities in it.
   static std::mutex mutex;
-  static std::set<std::string> known;
+  // Never destroyed: threads of a host program may still load cases while the process ends.
+  static auto& known = *new std::set<std::string>;
   const std::scoped_lock lock(mutex);
   if (known.insert(message).second) inform(communicator, "warning: " + message);
 }
