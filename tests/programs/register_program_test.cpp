@@ -120,7 +120,7 @@ TEST_F(RegisterProgram, RegistersByFieldAndByRayCasting) {
 TEST_F(RegisterProgram, SearchesWhereNoStartIsKnown) {
   const std::string search =
       "--renderer raycast --no-pictures --start search --search-modes 2 --search-rotation-deg "
-      "15,15,15 --search-translation-mm 15,15,15 -o ";
+      "15,15,15 --search-translation-mm 30,30,30 -o ";
   const test::ProgramRun alone = run_register(search + path("searched"));
   ASSERT_EQ(alone.exit_code, 0) << alone.output;
   EXPECT_NE(alone.output.find("search      "), std::string::npos) << alone.output;
