@@ -179,8 +179,7 @@ void find_starts(const RegisterOptions& options,
   });
 }
 
-/// README.md, "How it works", measures 14 registrations on a skull; a margin for finer
-/// fields.
+/// README.md, "How it works", measures 20 registrations on a skull.
 constexpr const char* kCastsWithoutFields =
     "renderer: raycast, as neither the study nor --field names a field. Fields (af-precompute) pay "
     "from about 20 registrations of this CT on: making them takes as long as a dozen or more by "
