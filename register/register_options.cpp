@@ -107,9 +107,10 @@ std::vector<std::string> problems(const RegisterOptions& options) {
         "the CT");
   if (options.correction.is_wanted && options.renderer == "raycast")
     found.emplace_back(kCorrectsRayCasting);
-  for (const std::string& text : problems(options.search)) found.push_back(text);
-  if (options.start != "search" && options.search != PoseSearchOptions{})
-    found.emplace_back("--search-... = set: must not be given without --start search");
+  for (const std::string& text : options.start == "search"
+                                     ? problems(options.search)
+                                     : problems_without_search(options.search, "--start search"))
+    found.push_back(text);
   for (const std::string& text : field_problems(options)) found.push_back(text);
   return found;
 }

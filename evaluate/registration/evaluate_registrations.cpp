@@ -329,11 +329,13 @@ std::vector<std::string> RegistrationStudyOptions::renderers() const {
 std::vector<std::string> problems(const RegistrationStudyOptions& options) {
   std::vector<std::string> found = problems(options.start_options());
   append_problems(options, found);
-  for (const std::string& text : problems(options.search)) found.push_back(text);
+  for (const std::string& text :
+       options.start_rule == "search"
+           ? problems(options.search)
+           : problems_without_search(options.search, "--start-rule search"))
+    found.push_back(text);
   if (options.start_rule == "search" && !options.starts_from.empty())
     found.emplace_back("--start-rule = search: must not be given with --starts-from");
-  if (options.start_rule != "search" && options.search != registration::PoseSearchOptions{})
-    found.emplace_back("--search-... = set: must not be given without --start-rule search");
   for (const std::string& text : field_problems(options)) found.push_back(text);
   const auto require_part = [&](const char* name, const std::optional<int>& part, int whole) {
     if (part.has_value() && !(*part >= 1 && *part <= whole))

@@ -121,4 +121,23 @@ std::vector<View> views_at(const RegistrationProblem& problem, const RigidTransf
   return views;
 }
 
+double across_beam_mm(const RegistrationProblem& problem,
+                      const std::vector<Eigen::Vector3d>& points_ct,
+                      const RigidTransform& from_room_from_ct,
+                      const RigidTransform& to_room_from_ct) {
+  double most_mm = 0.0;
+  for (const RegistrationView& view : problem.views) {
+    const CameraGeometry& camera = view.view.camera;
+    double sum_px = 0.0;
+    for (const Eigen::Vector3d& point : points_ct)
+      sum_px +=
+          (camera.project(to_room_from_ct * point) - camera.project(from_room_from_ct * point))
+              .norm();
+    most_mm = std::max(most_mm,
+                       sum_px / static_cast<double>(points_ct.size()) /
+                           camera.pixels_per_mm(problem.isocenter_point));
+  }
+  return most_mm;
+}
+
 }  // namespace af::registration

@@ -50,4 +50,11 @@ RegionOfInterest region_at(const RegistrationProblem& problem,
 /// All views with their regions at a pose, cut at the detectors' edges.
 std::vector<View> views_at(const RegistrationProblem& problem, const RigidTransform& room_from_ct);
 
+/// How far points of the CT are displaced between two poses, mean over them, across the beam of the
+/// view that shows it most: mm on the isocentre plane.
+double across_beam_mm(const RegistrationProblem& problem,
+                      const std::vector<Eigen::Vector3d>& points_ct,
+                      const RigidTransform& from_room_from_ct,
+                      const RigidTransform& to_room_from_ct);
+
 }  // namespace af::registration

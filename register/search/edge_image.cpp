@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "base/vector_width.h"
 #include "register/search/edge_correlation_kernel.h"
+#include "register/similarity/gradient_images.h"
 
 namespace af::registration {
 namespace {
@@ -15,27 +16,37 @@ namespace {
 /// told apart from a stronger one.
 constexpr float kRmsSteps = 51.0f;
 
-bool is_used(std::span<const std::uint8_t> used, std::size_t pixel) {
-  return used.empty() || used[pixel] != 0;
+/// Whether a pixel and its neighbours are used, which its gradient looks at.
+bool is_all_used(const Image2d& image, std::span<const std::uint8_t> used, int column, int row) {
+  for (int r = row - 1; r <= row + 1; ++r)
+    for (int c = column - 1; c <= column + 1; ++c)
+      if (used[static_cast<std::size_t>(r) * static_cast<std::size_t>(image.width) +
+               static_cast<std::size_t>(c)] == 0)
+        return false;
+  return true;
 }
 
 /// g / sqrt|g| along columns and rows of every pixel.
 std::vector<float> compressed_gradients(const Image2d& image, std::span<const std::uint8_t> used) {
+  GradientPair gradients;
+  gradients.resize(image.pixels.size());
+  pixel_sum_kernels().sobel(image.pixels.data(),
+                            image.width,
+                            image.height,
+                            gradients.along_columns.data(),
+                            gradients.along_rows.data());
   std::vector<float> edges(2 * image.pixels.size(), 0.0f);
-  const auto stride = static_cast<std::size_t>(image.width);
   for (int row = 1; row + 1 < image.height; ++row)
     for (int column = 1; column + 1 < image.width; ++column) {
-      const std::size_t at =
-          static_cast<std::size_t>(row) * stride + static_cast<std::size_t>(column);
-      if (!is_used(used, at - 1) || !is_used(used, at + 1) || !is_used(used, at - stride) ||
-          !is_used(used, at + stride))
-        continue;
-      const float x = image.pixels[at + 1] - image.pixels[at - 1];
-      const float y = image.pixels[at + stride] - image.pixels[at - stride];
-      const float size = std::hypot(x, y);
-      if (!(size > 0.0f) || !std::isfinite(size)) continue;
-      edges[2 * at] = x / std::sqrt(size);
-      edges[2 * at + 1] = y / std::sqrt(size);
+      if (!used.empty() && !is_all_used(image, used, column, row)) continue;
+      const std::size_t at = static_cast<std::size_t>(row) * static_cast<std::size_t>(image.width) +
+                             static_cast<std::size_t>(column);
+      const float x = gradients.along_columns[at];
+      const float y = gradients.along_rows[at];
+      const float root = std::sqrt(std::sqrt(x * x + y * y));
+      if (!(root > 0.0f) || !std::isfinite(root)) continue;
+      edges[2 * at] = x / root;
+      edges[2 * at + 1] = y / root;
     }
   return edges;
 }

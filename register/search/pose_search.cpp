@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "geometry/tre.h"
 #include "register/method/registration_options.h"
+#include "register/problem/target_region.h"
 #include "register/search/rotation_set.h"
 #include "register/search/searched_view.h"
 
@@ -49,8 +50,8 @@ MotionRange common_part(const MotionRange& a, const MotionRange& b) {
 MotionRange seen_from(const PoseFrame& frame, const MotionLimit& limit) {
   if (!limit.frame.rotation.isApprox(frame.rotation, 1e-6) ||
       !limit.frame.center_ct_mm.isApprox(frame.center_ct_mm, 1e-6))
-    throw InputError("--start",
-                     "search",
+    throw InputError("search of starts",
+                     "several fields",
                      "the fields' nominal poses differ in rotation or centre: --renderer raycast "
                      "searches without them");
   MotionRange range = limit.range;
@@ -172,8 +173,6 @@ struct Looking {
     moved.center_room_mm += translation;
     return moved.nominal_room_from_ct();
   }
-  /// The middle of the lattice, about which depths are counted.
-  [[nodiscard]] Eigen::Vector3d middle() const { return lattice.middle(); }
   /// Adds how alike a view is at every translation.
   void add_view(std::size_t view, const Eigen::Matrix3d& rotation, Scratch& scratch) const;
   /// The best maxima of one rotation, whose index they get.
@@ -208,11 +207,11 @@ void Looking::add_view(std::size_t view, const Eigen::Matrix3d& rotation, Scratc
   for (int layer = 0; layer < seen.depths.count; ++layer) {
     const std::span<float> likeness =
         std::span(scratch.likeness).subspan(static_cast<std::size_t>(layer) * shifts, shifts);
-    const RenderStatus status =
-        seen.renderer->render(pose(rotation, middle() + seen.depths.at(layer) * seen.along_beam),
-                              seen.pattern,
-                              *scratch.workspaces[view],
-                              scratch.drr.pixels);
+    const RenderStatus status = seen.renderer->render(
+        pose(rotation, lattice.middle() + seen.depths.at(layer) * seen.along_beam),
+        seen.pattern,
+        *scratch.workspaces[view],
+        scratch.drr.pixels);
     // Where a field lacks rays, their zeros would be edges.
     if (status.is_inside())
       correlate(EdgeImage(scratch.drr, {}, 0), seen.xray, seen.shift_window, likeness);
@@ -287,21 +286,21 @@ struct PoseSearch::Parts {
 void PoseSearchOptions::describe(Fields& field) {
   field("search_modes",
         modes,
-        "--start search: so many of the likeliest poses are registered; the best end wins")
+        "Search: how many of the likeliest poses are registered; the best end wins")
       .at_least(1)
       .at_most(100);
   field("search_orientations",
         orientations,
-        "--start search: 'field' looks at rotations of the fields' range (without fields +-20 "
+        "Search: 'field' looks at rotations of the fields' range (without fields +-20 "
         "degrees); 'flips' also at the patient turned by 180 degrees about each axis; 'any' at all "
         "rotations. The last two need --renderer raycast")
       .choice({"field", "flips", "any"});
   field("search_rotation_deg",
         rotation_deg,
-        "--start search: rx,ry,rz farthest from nominal, degrees (default: the fields' range)");
+        "Search: rx,ry,rz farthest from nominal, degrees (default: the fields' range)");
   field("search_translation_mm",
         translation_mm,
-        "--start search: tx,ty,tz farthest from nominal, mm (default: the fields' range, without "
+        "Search: tx,ty,tz farthest from nominal, mm (default: the fields' range, without "
         "fields 40 mm)");
 }
 
@@ -323,6 +322,21 @@ std::vector<std::string> problems(const PoseSearchOptions& options) {
   return found;
 }
 
+std::vector<std::string> problems_without_search(const PoseSearchOptions& options,
+                                                 const std::string& wanted_by) {
+  const PoseSearchOptions usual;
+  std::vector<std::string> found;
+  const auto refuse = [&](const char* name, bool is_given) {
+    if (is_given)
+      found.push_back(std::string(name) + " = set: must not be given without " + wanted_by);
+  };
+  refuse("--search-modes", options.modes != usual.modes);
+  refuse("--search-orientations", options.orientations != usual.orientations);
+  refuse("--search-rotation-deg", options.rotation_deg.has_value());
+  refuse("--search-translation-mm", options.translation_mm.has_value());
+  return found;
+}
+
 int coarsest_level(const PoseSearchOptions& options) {
   return options.orientations == "any" ? kCoarsestLevel : kCoarsestLevel - 1;
 }
@@ -332,15 +346,8 @@ double seen_distance_mm(const RegistrationProblem& problem,
                         const RigidTransform& b) {
   const std::vector<Eigen::Vector3d>& points =
       problem.target_points_ct.empty() ? problem.scaling_points_ct : problem.target_points_ct;
-  if (problem.views.size() > 1) return mean_tre_mm(a, b, points);
-  const CameraGeometry& camera = problem.views.front().view.camera;
-  double sum_mm = 0.0;
-  for (const Eigen::Vector3d& point : points) {
-    const Eigen::Vector3d beam = (a * point - camera.source_point).normalized();
-    const Eigen::Vector3d apart = b * point - a * point;
-    sum_mm += (apart - beam.dot(apart) * beam).norm();
-  }
-  return sum_mm / static_cast<double>(points.size());
+  return problem.views.size() > 1 ? mean_tre_mm(a, b, points)
+                                  : across_beam_mm(problem, points, a, b);
 }
 
 bool are_apart(const RegistrationProblem& problem,
@@ -395,9 +402,8 @@ std::vector<PoseMode> PoseSearch::modes() const {
   std::vector<PoseMode> modes = parts_->looking.modes(
       parts_->first.has_value() ? rotations : parts_->rotations, count, threads);
   if (modes.empty())
-    throw InputError("--start",
-                     "search",
-                     "no DRR within " + parts_->searched.range.text() + " is like the X-rays");
+    throw InputError(
+        "search of starts", parts_->searched.range.text(), "no DRR there is like the X-rays");
   return modes;
 }
 

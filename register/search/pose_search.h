@@ -24,10 +24,12 @@ struct PoseSearchOptions {
   std::optional<std::array<double, 3>> translation_mm;
 
   void describe(Fields& field);
-  bool operator==(const PoseSearchOptions&) const = default;
 };
 
 std::vector<std::string> problems(const PoseSearchOptions& options);
+/// Options that were given to a program that does not search; `wanted_by`: what makes it search.
+std::vector<std::string> problems_without_search(const PoseSearchOptions& options,
+                                                 const std::string& wanted_by);
 
 /// Of the image pyramids: the level that the search needs, whatever stages need.
 int coarsest_level(const PoseSearchOptions& options);

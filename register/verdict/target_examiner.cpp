@@ -97,25 +97,6 @@ std::optional<TargetAlone> target_alone(const RegistrationProblem& whole,
   return alone;
 }
 
-/// The mean displacement of the target's points across the beam, in the view that shows it most.
-double across_mm(const RegistrationProblem& problem,
-                 const RigidTransform& from_room_from_ct,
-                 const RigidTransform& to_room_from_ct) {
-  double most_mm = 0.0;
-  for (const RegistrationView& view : problem.views) {
-    const CameraGeometry& camera = view.view.camera;
-    double sum_px = 0.0;
-    for (const Eigen::Vector3d& point : problem.target_points_ct)
-      sum_px +=
-          (camera.project(to_room_from_ct * point) - camera.project(from_room_from_ct * point))
-              .norm();
-    most_mm = std::max(most_mm,
-                       sum_px / static_cast<double>(problem.target_points_ct.size()) /
-                           camera.pixels_per_mm(problem.isocenter_point));
-  }
-  return most_mm;
-}
-
 /// The stage's value for the rest alone, with the target where no view sees it.
 double value_without_target(MultiViewObjective& objective, const RigidTransform& room_from_ct) {
   constexpr double kOutOfSightMm = 1e5;
@@ -186,7 +167,9 @@ TargetEvidence TargetExaminer::evidence(const RigidTransform& room_from_ct) {
             .first;
   const std::optional<TargetAnswer>& answer = known->second;
   if (!answer) return {};
-  return {answer->share, across_mm(*problem_, room_from_ct, answer->room_from_ct)};
+  return {
+      answer->share,
+      across_beam_mm(*problem_, problem_->target_points_ct, room_from_ct, answer->room_from_ct)};
 }
 
 }  // namespace af::registration

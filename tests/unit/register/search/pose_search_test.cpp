@@ -201,6 +201,8 @@ TEST(PoseSearchOptions, NamesEverythingThatIsWrong) {
   options.orientations = "any";
   options.rotation_deg = {10.0, 10.0, 10.0};
   EXPECT_EQ(problems(options).size(), 1u);
+  EXPECT_EQ(problems_without_search(options, "x").size(), 2u);
+  EXPECT_EQ(problems_without_search({}, "x").size(), 0u);
 }
 
 }  // namespace
