@@ -159,6 +159,7 @@ std::string search_text(const PoseSearch& search,
 
 /// Collective. Rank 0 looks for starts where they are not known.
 void find_starts(const RegisterOptions& options,
+                 const RegistrationOptions& method,
                  const RegistrationProblem& problem,
                  const std::shared_ptr<ThreadPool>& pool,
                  const Communicator& world,
@@ -167,7 +168,7 @@ void find_starts(const RegisterOptions& options,
   const WorkNote note("searching for starts", WorkNote::Kind::Phase);
   registered.starts = shared_poses(world, [&] {
     const auto begin = std::chrono::steady_clock::now();
-    const PoseSearch search(problem, options.search, pool);
+    const PoseSearch search(problem, options.search, method.silhouette_mm(), pool);
     const std::vector<PoseMode> modes = search.modes();
     const double seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
@@ -313,7 +314,7 @@ void run_registration(const RegisterOptions& typed,
   LoadedCase loaded = load_problem(options, method, registered, pool, world);
   loaded.xray_readers.clear();  // no other X-rays follow
   const auto& problem = loaded.problem;
-  find_starts(options, *problem, pool, world, registered);
+  find_starts(options, method, *problem, pool, world, registered);
   Registration registration = all_or_none(world, [&] {
     Registration made(problem, method, pool);
     made.examine_ends(options.uncertainty, pool);

@@ -5,34 +5,42 @@
 
 namespace af::registration {
 
-/// Pairs of 16-bit numbers, one pair per pixel: an edge along columns and along rows. Rows are
-/// `stride` pixels apart.
+/// A pixel of a pattern: two 16-bit numbers, an edge along columns and along rows.
+struct PatternPixel {
+  int16_t edge[2];
+  int32_t offset;  ///< in an image, in pixels from where the pattern's first pixel lies
+};
+
+/// Pairs of 16-bit numbers, one pair per pixel. Rows are `stride` pixels apart.
 struct EdgePixels {
   const int16_t* first;
   int32_t stride;
 };
 
-/// Sizes in pixels.
-struct CorrelatedSizes {
-  int32_t width;    ///< of the pattern
-  int32_t height;   ///< likewise
-  int32_t columns;  ///< how many shifts along columns
-  int32_t rows;     ///< likewise
+/// Shifts of a pattern.
+struct ShiftCount {
+  int32_t columns;
+  int32_t rows;
 };
 
-/// products[row * columns + column] = sum of the scalar products of the pattern's edges with those
-/// of the image, which begins at pixel (column, row). Exact, so that all widths give the same bits.
-using CorrelateEdges = void (*)(const EdgePixels& pattern,
+/// How far beyond the last pixel of a pattern, at its last shift, images are read, in pixels.
+inline constexpr int kPixelsReadBeyond = 16;
+
+/// products[row * columns + column] = sum over the pattern's pixels of the scalar products with the
+/// image's, which begins at pixel (column, row). Exact, so that all widths give the same bits.
+using CorrelateEdges = void (*)(const PatternPixel* pattern,
+                                int32_t pixel_count,
                                 const EdgePixels& image,
-                                const CorrelatedSizes& sizes,
+                                const ShiftCount& shifts,
                                 int32_t* products);
 
-#define AF_DECLARE_KERNELS(space)                    \
-  namespace space {                                  \
-  void correlate_edges(const EdgePixels& pattern,    \
-                       const EdgePixels& image,      \
-                       const CorrelatedSizes& sizes, \
-                       int32_t* products);           \
+#define AF_DECLARE_KERNELS(space)                   \
+  namespace space {                                 \
+  void correlate_edges(const PatternPixel* pattern, \
+                       int32_t pixel_count,         \
+                       const EdgePixels& image,     \
+                       const ShiftCount& shifts,    \
+                       int32_t* products);          \
   }
 AF_DECLARE_KERNELS(kernels_128)
 AF_DECLARE_KERNELS(kernels_256)

@@ -16,6 +16,9 @@ namespace {
 /// told apart from a stronger one.
 constexpr float kRmsSteps = 51.0f;
 
+/// Numbers that kernels may read behind the last edge.
+constexpr std::size_t kReadBeyond = 2 * kPixelsReadBeyond;
+
 /// Whether a pixel and its neighbours are used, which its gradient looks at.
 bool is_all_used(const Image2d& image, std::span<const std::uint8_t> used, int column, int row) {
   for (int r = row - 1; r <= row + 1; ++r)
@@ -79,7 +82,7 @@ EdgeImage::EdgeImage(const Image2d& image, std::span<const std::uint8_t> used, i
   const auto width = static_cast<std::size_t>(width_);
   const auto height = static_cast<std::size_t>(height_);
   const auto added = static_cast<std::size_t>(border);
-  edges_.assign(2 * width * height, 0);
+  edges_.assign(2 * width * height + kReadBeyond, 0);
   const std::size_t numbers = 2 * static_cast<std::size_t>(image.width);
   for (std::size_t row = 0; row < static_cast<std::size_t>(image.height); ++row)
     for (std::size_t i = 0; i < numbers; ++i)
@@ -111,42 +114,127 @@ std::int64_t EdgeImage::energy(int column, int row, int width, int height) const
          sum_to(column + width, row) + sum_to(column, row);
 }
 
+namespace {
+
+/// The used pixels of a pattern that has an edge there, for an image whose rows are so far apart.
+std::vector<PatternPixel> edge_pixels(const EdgeImage& pattern,
+                                      std::span<const std::uint8_t> used,
+                                      int image_stride) {
+  std::vector<PatternPixel> pixels;
+  for (int row = 0; row < pattern.height(); ++row)
+    for (int column = 0; column < pattern.width(); ++column) {
+      const std::size_t at = static_cast<std::size_t>(row * pattern.width() + column);
+      const std::int16_t* const edge = pattern.edges() + 2 * at;
+      if ((used.empty() || used[at] != 0) && (edge[0] != 0 || edge[1] != 0))
+        pixels.push_back({{edge[0], edge[1]}, row * image_stride + column});
+    }
+  return pixels;
+}
+
+/// Ones at the used pixels of a pattern so wide.
+std::vector<PatternPixel> ones(std::span<const std::uint8_t> used, int width, int image_stride) {
+  std::vector<PatternPixel> pixels;
+  for (std::size_t i = 0; i < used.size(); ++i) {
+    const auto at = static_cast<int>(i);
+    if (used[i] != 0) pixels.push_back({{1, 1}, at / width * image_stride + at % width});
+  }
+  return pixels;
+}
+
+/// Sums of products with the pairs of an image at every shift of a window, where a pattern of this
+/// size must stay within the image.
+std::vector<std::int32_t> products(const std::vector<PatternPixel>& pattern,
+                                   const std::int16_t* image_pairs,
+                                   const EdgeImage& image,
+                                   const ShiftWindow& window) {
+  std::vector<std::int32_t> sums(window.size());
+  const auto kernel = select_kernel<CorrelateEdges>(
+      kernels_128::correlate_edges, kernels_256::correlate_edges, kernels_512::correlate_edges);
+  kernel(pattern.data(),
+         static_cast<std::int32_t>(pattern.size()),
+         {image_pairs + 2 * (static_cast<std::ptrdiff_t>(window.first_row) * image.width() +
+                             window.first_column),
+          image.width()},
+         {window.columns, window.rows},
+         sums.data());
+  return sums;
+}
+
+void require_within(const EdgeImage& pattern,
+                    const EdgeImage& image,
+                    const ShiftWindow& window,
+                    std::span<const float> likeness) {
+  const auto& [first_column, first_row, columns, rows] = window;
+  check(first_column >= 0 && first_row >= 0 &&
+            first_column + columns + pattern.width() - 1 <= image.width() &&
+            first_row + rows + pattern.height() - 1 <= image.height(),
+        "a pattern must stay within the image");
+  check(likeness.size() == window.size(), "there is a likeness for every shift");
+  check(pattern.width() * pattern.height() <= EdgeImage::kMostPixels,
+        "sums of a larger pattern may overflow");
+}
+
+/// Share of an image's mean energy that counts where it shows less.
+constexpr double kLeastShare = 0.25;
+
+float normalised(std::int32_t product, double of_pattern, double of_image) {
+  const double both = of_pattern * of_image;
+  return both > 0.0 ? static_cast<float>(static_cast<double>(product) / std::sqrt(both)) : 0.0f;
+}
+
+}  // namespace
+
 void correlate(const EdgeImage& pattern,
                const EdgeImage& image,
                const ShiftWindow& window,
                std::span<float> likeness) {
+  require_within(pattern, image, window, likeness);
   const int width = pattern.width();
   const int height = pattern.height();
-  const auto& [first_column, first_row, columns, rows] = window;
-  check(first_column >= 0 && first_row >= 0 &&
-            first_column + columns + width - 1 <= image.width() &&
-            first_row + rows + height - 1 <= image.height(),
-        "a pattern must stay within the image");
-  check(likeness.size() == window.size(), "there is a likeness for every shift");
-  check(width * height <= EdgeImage::kMostPixels, "sums of a larger pattern may overflow");
-  std::vector<std::int32_t> products(likeness.size());
-  const auto kernel = select_kernel<CorrelateEdges>(
-      kernels_128::correlate_edges, kernels_256::correlate_edges, kernels_512::correlate_edges);
-  kernel(
-      {pattern.edges(), width},
-      {image.edges() + 2 * (static_cast<std::ptrdiff_t>(first_row) * image.width() + first_column),
-       image.width()},
-      {width, height, columns, rows},
-      products.data());
-
-  constexpr double kLeastShare = 0.25;
+  const std::vector<std::int32_t> alike =
+      products(edge_pixels(pattern, {}, image.width()), image.edges(), image, window);
   const double of_pattern = static_cast<double>(pattern.energy(0, 0, width, height));
   const double floor = kLeastShare * image.mean_energy() * width * height;
-  for (int row = 0; row < rows; ++row)
-    for (int column = 0; column < columns; ++column) {
-      const auto i = static_cast<std::size_t>(row * columns + column);
-      const double here =
-          static_cast<double>(image.energy(first_column + column, first_row + row, width, height));
-      const double both = of_pattern * std::max(here, floor);
-      likeness[i] = both > 0.0
-                        ? static_cast<float>(static_cast<double>(products[i]) / std::sqrt(both))
-                        : 0.0f;
+  for (int row = 0; row < window.rows; ++row)
+    for (int column = 0; column < window.columns; ++column) {
+      const auto i = static_cast<std::size_t>(row * window.columns + column);
+      const double here = static_cast<double>(
+          image.energy(window.first_column + column, window.first_row + row, width, height));
+      likeness[i] = normalised(alike[i], of_pattern, std::max(here, floor));
     }
+}
+
+std::vector<std::int16_t> quarter_squares(const EdgeImage& image) {
+  static_assert(EdgeImage::kLargestEdge * EdgeImage::kLargestEdge / 4 <= INT16_MAX);
+  std::vector<std::int16_t> squares(2 * static_cast<std::size_t>(image.width()) *
+                                    static_cast<std::size_t>(image.height()));
+  std::transform(
+      image.edges(), image.edges() + squares.size(), squares.begin(), [](std::int16_t edge) {
+        return static_cast<std::int16_t>(edge * edge / 4);
+      });
+  return squares;
+}
+
+void correlate_within(std::span<const std::uint8_t> used,
+                      const EdgeImage& pattern,
+                      const EdgeImage& image,
+                      std::span<const std::int16_t> image_squares,
+                      const ShiftWindow& window,
+                      std::span<float> likeness) {
+  require_within(pattern, image, window, likeness);
+  check(2 * used.size() == pattern.edge_count(), "a pixel is used or not");
+  check(image_squares.size() >= image.edge_count(), "squares are of this image");
+  const std::vector<PatternPixel> edges = edge_pixels(pattern, used, image.width());
+  const std::vector<PatternPixel> counted = ones(used, pattern.width(), image.width());
+  const std::vector<std::int32_t> alike = products(edges, image.edges(), image, window);
+  const std::vector<std::int32_t> energies = products(counted, image_squares.data(), image, window);
+  double of_pattern = 0.0;
+  for (const PatternPixel& pixel : edges)
+    of_pattern += pixel.edge[0] * pixel.edge[0] + pixel.edge[1] * pixel.edge[1];
+  const double floor = kLeastShare * image.mean_energy() * static_cast<double>(counted.size());
+  for (std::size_t i = 0; i < likeness.size(); ++i)
+    likeness[i] =
+        normalised(alike[i], of_pattern, std::max(4.0 * static_cast<double>(energies[i]), floor));
 }
 
 }  // namespace af::registration

@@ -28,6 +28,10 @@ class EdgeImage {
   [[nodiscard]] int height() const { return height_; }  ///< likewise
   /// Along columns and rows, pixel by pixel.
   [[nodiscard]] const std::int16_t* edges() const { return edges_.data(); }
+  /// How many numbers edges() has.
+  [[nodiscard]] std::size_t edge_count() const {
+    return 2 * static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
+  }
   /// Mean of squares over the pixels within the border.
   [[nodiscard]] double mean_energy() const;
   /// Sum of squares over the rectangle whose first pixel is (column, row).
@@ -62,5 +66,20 @@ void correlate(const EdgeImage& pattern,
                const EdgeImage& image,
                const ShiftWindow& window,
                std::span<float> likeness);
+
+/// A quarter of the squares of an image's edges, in the order of EdgeImage::edges(), and some zeros
+/// that kernels may read.
+std::vector<std::int16_t> quarter_squares(const EdgeImage& image);
+
+/// The same where only a part of the pattern counts (`used`: one per pixel, 0: not used), as of a
+/// CT of one bone, which shows nothing of what is around it. Both energies are those within that
+/// part. `image_squares`: quarter_squares() of the image.
+/// \test EdgeCorrelation.WithinAPartIgnoresWhatIsAroundIt
+void correlate_within(std::span<const std::uint8_t> used,
+                      const EdgeImage& pattern,
+                      const EdgeImage& image,
+                      std::span<const std::int16_t> image_squares,
+                      const ShiftWindow& window,
+                      std::span<float> likeness);
 
 }  // namespace af::registration

@@ -23,8 +23,11 @@ namespace {
 constexpr int kPixelsAcross = 64;
 /// Of the first look at all rotations, of which there are eight times fewer at twice the step.
 constexpr int kFirstPixelsAcross = 32;
-/// Modes of the first look that are looked at again, from nearby rotations.
-constexpr std::size_t kFirstModes = 8;
+/// Modes of the first look at all rotations that are looked at again, with rotations between its
+/// own, and of these once more. Shafts of bones lie along each other at many places: one bone of a
+/// wrist was the 80th of the first look and the third of the second.
+constexpr std::size_t kFirstModes = 128;
+constexpr std::size_t kSecondModes = 32;
 /// How far, in coarse pixels, points at the middle distance from the centre may move between
 /// neighbouring rotations. An edge that lies a pixel aside still overlaps, because edges are two to
 /// three pixels wide.
@@ -125,26 +128,16 @@ std::vector<Eigen::Matrix3d> searched_rotations(const PoseSearchOptions& options
   return rotations;
 }
 
-/// A pose's own rotation and those that differ by a step about some of the axes.
-void add_rotations_about(const RigidTransform& room_from_ct,
-                         double step_rad,
-                         std::vector<Eigen::Matrix3d>& rotations) {
-  for (const double x : {-step_rad, 0.0, step_rad})
-    for (const double y : {-step_rad, 0.0, step_rad})
-      for (const double z : {-step_rad, 0.0, step_rad})
-        rotations.emplace_back(rotation_from_angles({x, y, z}) * room_from_ct.linear());
-}
-
 /// A place of the search that no neighbour beats.
 struct Maximum {
   float likeness = 0.0f;
-  std::uint32_t rotation = 0;
+  std::uint32_t turn = 0;
   std::uint32_t translation = 0;
 
   /// The likelier first; equal ones by their place, so that the order is always the same.
   [[nodiscard]] bool is_before(const Maximum& other) const {
     if (likeness != other.likeness) return likeness > other.likeness;
-    return std::pair(rotation, translation) < std::pair(other.rotation, other.translation);
+    return std::pair(turn, translation) < std::pair(other.turn, other.translation);
   }
 };
 
@@ -152,19 +145,37 @@ struct Maximum {
 struct Scratch {
   std::vector<std::unique_ptr<RenderWorkspace>> workspaces;  ///< of the views
   Image2d drr;
-  std::vector<float> likeness;  ///< of one view, layer after layer
-  std::vector<float> sums;      ///< over the views, at every translation
+  std::vector<Eigen::Vector2d> cuts_px;
+  std::vector<float> likeness;  ///< of one view, depth after depth
+  std::vector<float> sums;      ///< over the views, at every node
+};
+
+/// Some translations of a search.
+struct SearchedPart {
+  LatticePart nodes;
+  std::vector<std::size_t> indices;      ///< of the nodes
+  std::vector<SearchedView::Part> seen;  ///< by each view
+};
+
+/// A rotation, and the translations that are looked at with it.
+struct Turn {
+  Eigen::Matrix3d rotation;
+  const SearchedPart* part;
 };
 
 /// A search at one size of pixels, over any rotations.
 struct Looking {
   const RegistrationProblem& problem;
   PoseFrame frame;  ///< of the searched range
+  double pixel_mm;
   double rotation_step_rad;
   TranslationLattice lattice;
   std::vector<SearchedView> views;
 
-  Looking(const RegistrationProblem& registered, const MotionLimit& searched, int pixels_across);
+  Looking(const RegistrationProblem& registered,
+          const MotionLimit& searched,
+          int pixels_across,
+          double silhouette_mm);
 
   [[nodiscard]] RigidTransform pose(const Eigen::Matrix3d& rotation,
                                     const Eigen::Vector3d& translation) const {
@@ -173,68 +184,82 @@ struct Looking {
     moved.center_room_mm += translation;
     return moved.nominal_room_from_ct();
   }
+  [[nodiscard]] SearchedPart part(const LatticePart& nodes) const;
   /// Adds how alike a view is at every translation.
-  void add_view(std::size_t view, const Eigen::Matrix3d& rotation, Scratch& scratch) const;
-  /// The best maxima of one rotation, whose index they get.
-  [[nodiscard]] std::vector<Maximum> maxima(const Eigen::Matrix3d& rotation,
-                                            std::size_t index,
-                                            Scratch& scratch) const;
-  /// The likeliest poses with one of these rotations, at most `count`, apart from each other.
+  void add_view(std::size_t view, const Turn& turn, Scratch& scratch) const;
+  /// The best maxima of one turn, whose index they get.
+  [[nodiscard]] std::vector<Maximum> maxima_of(const Turn& turn,
+                                               std::size_t index,
+                                               Scratch& scratch) const;
+  /// The likeliest poses of these turns, at most `count`, apart from each other.
+  [[nodiscard]] std::vector<PoseMode> modes(const std::vector<Turn>& turns,
+                                            std::size_t count,
+                                            ThreadPool& threads) const;
+  /// The same over all translations.
   [[nodiscard]] std::vector<PoseMode> modes(const std::vector<Eigen::Matrix3d>& rotations,
                                             std::size_t count,
                                             ThreadPool& threads) const;
+  /// The same about some modes: rotations that differ by a step about some of the axes, and
+  /// translations up to `reach_mm` away.
+  [[nodiscard]] std::vector<PoseMode> modes_near(const std::vector<PoseMode>& modes,
+                                                 double step_rad,
+                                                 double reach_mm,
+                                                 std::size_t count,
+                                                 ThreadPool& threads) const;
 };
 
 Looking::Looking(const RegistrationProblem& registered,
                  const MotionLimit& searched,
-                 int pixels_across)
+                 int pixels_across,
+                 double silhouette_mm)
     : problem(registered),
       frame(searched.frame),
+      pixel_mm(pixel_mm_of(registered, pixels_across, silhouette_mm)),
       rotation_step_rad(kPixelsPerRotation * 2.0 * std::numbers::sqrt2 / pixels_across),
-      lattice(searched.range, pixel_mm_of(registered, pixels_across)) {
-  const double pixel_mm = pixel_mm_of(registered, pixels_across);
+      lattice(searched.range, pixel_mm) {
   for (const RegistrationView& view : problem.views)
-    views.push_back(searched_view(problem, frame.center_room_mm, view, lattice, pixel_mm));
+    views.push_back(
+        searched_view(problem, frame.center_room_mm, view, lattice, pixel_mm, silhouette_mm));
 }
 
-void Looking::add_view(std::size_t view, const Eigen::Matrix3d& rotation, Scratch& scratch) const {
+SearchedPart Looking::part(const LatticePart& nodes) const {
+  SearchedPart part{nodes, lattice.nodes(nodes), {}};
+  for (const SearchedView& view : views) part.seen.push_back(view.part(part.indices));
+  return part;
+}
+
+void Looking::add_view(std::size_t view, const Turn& turn, Scratch& scratch) const {
   const SearchedView& seen = views[view];
-  const std::size_t shifts = seen.shifts();
-  scratch.likeness.resize(shifts * static_cast<std::size_t>(seen.depths.count));
   scratch.drr.width = seen.pattern.roi.width;
   scratch.drr.height = seen.pattern.roi.height;
   scratch.drr.pixels.resize(seen.pattern.pixel_count());
-  for (int layer = 0; layer < seen.depths.count; ++layer) {
-    const std::span<float> likeness =
-        std::span(scratch.likeness).subspan(static_cast<std::size_t>(layer) * shifts, shifts);
-    const RenderStatus status = seen.renderer->render(
-        pose(rotation, lattice.middle() + seen.depths.at(layer) * seen.along_beam),
-        seen.pattern,
-        *scratch.workspaces[view],
-        scratch.drr.pixels);
-    // Where a field lacks rays, their zeros would be edges.
-    if (status.is_inside())
-      correlate(EdgeImage(scratch.drr, {}, 0), seen.xray, seen.shift_window, likeness);
-    else
-      std::ranges::fill(likeness, 0.0f);
-  }
-  seen.add_likeness(scratch.likeness, scratch.sums);
+  const RigidTransform room_from_ct = pose(turn.rotation, lattice.middle());
+  const RenderStatus status = seen.renderer->render(
+      room_from_ct, seen.pattern, *scratch.workspaces[view], scratch.drr.pixels);
+  // Where a field lacks rays, their zeros would be edges.
+  if (!status.is_inside()) return;
+  scratch.cuts_px.clear();
+  for (const Eigen::Vector3d& cut : problem.cut_points_ct)
+    scratch.cuts_px.emplace_back(seen.pattern.camera.project(room_from_ct * cut));
+  const SearchedView::Part& part = turn.part->seen[view];
+  scratch.likeness.resize(part.size());
+  seen.compare(part, scratch.drr, scratch.cuts_px, scratch.likeness);
+  seen.add_likeness(part, turn.part->indices, scratch.likeness, scratch.sums);
 }
 
-std::vector<Maximum> Looking::maxima(const Eigen::Matrix3d& rotation,
-                                     std::size_t index,
-                                     Scratch& scratch) const {
+std::vector<Maximum> Looking::maxima_of(const Turn& turn,
+                                        std::size_t index,
+                                        Scratch& scratch) const {
   if (scratch.workspaces.empty())
     for (const SearchedView& view : views)
       scratch.workspaces.push_back(view.renderer->make_workspace());
-  scratch.sums.assign(lattice.size(), 0.0f);
-  for (std::size_t view = 0; view < views.size(); ++view) add_view(view, rotation, scratch);
+  scratch.sums.assign(turn.part->indices.size(), 0.0f);
+  for (std::size_t view = 0; view < views.size(); ++view) add_view(view, turn, scratch);
   std::vector<Maximum> found;
-  for (std::size_t i = 0; i < scratch.sums.size(); ++i)
-    if (lattice.is_maximum(scratch.sums, i))
-      found.push_back({scratch.sums[i] / static_cast<float>(views.size()),
-                       static_cast<std::uint32_t>(index),
-                       static_cast<std::uint32_t>(i)});
+  for (const std::size_t i : maxima(scratch.sums, turn.part->nodes))
+    found.push_back({scratch.sums[i] / static_cast<float>(views.size()),
+                     static_cast<std::uint32_t>(index),
+                     static_cast<std::uint32_t>(turn.part->indices[i])});
   const std::size_t kept = std::min(found.size(), kMaximaPerRotation);
   std::partial_sort(found.begin(),
                     found.begin() + static_cast<std::ptrdiff_t>(kept),
@@ -244,17 +269,17 @@ std::vector<Maximum> Looking::maxima(const Eigen::Matrix3d& rotation,
   return found;
 }
 
-std::vector<PoseMode> Looking::modes(const std::vector<Eigen::Matrix3d>& rotations,
+std::vector<PoseMode> Looking::modes(const std::vector<Turn>& turns,
                                      std::size_t count,
                                      ThreadPool& threads) const {
-  std::vector<std::vector<Maximum>> of_rotations(rotations.size());
+  std::vector<std::vector<Maximum>> of_turns(turns.size());
   std::vector<Scratch> scratch(static_cast<std::size_t>(threads.threads()));
-  threads.for_each(static_cast<int>(rotations.size()), [&](int rotation, int slot) {
-    const auto i = static_cast<std::size_t>(rotation);
-    of_rotations[i] = maxima(rotations[i], i, scratch[static_cast<std::size_t>(slot)]);
+  threads.for_each(static_cast<int>(turns.size()), [&](int turn, int slot) {
+    const auto i = static_cast<std::size_t>(turn);
+    of_turns[i] = maxima_of(turns[i], i, scratch[static_cast<std::size_t>(slot)]);
   });
   std::vector<Maximum> all;
-  for (const std::vector<Maximum>& found : of_rotations)
+  for (const std::vector<Maximum>& found : of_turns)
     all.insert(all.end(), found.begin(), found.end());
   std::sort(
       all.begin(), all.end(), [](const Maximum& a, const Maximum& b) { return a.is_before(b); });
@@ -263,13 +288,42 @@ std::vector<PoseMode> Looking::modes(const std::vector<Eigen::Matrix3d>& rotatio
   for (const Maximum& maximum : all) {
     if (found.size() == count || maximum.likeness <= 0.0f) break;
     const RigidTransform here =
-        pose(rotations[maximum.rotation], lattice.translation(maximum.translation));
+        pose(turns[maximum.turn].rotation, lattice.translation(maximum.translation));
     const bool is_apart = std::all_of(found.begin(), found.end(), [&](const PoseMode& likelier) {
       return are_apart(problem, here, likelier.room_from_ct, kModesApartMm);
     });
     if (is_apart) found.push_back({here, static_cast<double>(maximum.likeness)});
   }
   return found;
+}
+
+std::vector<PoseMode> Looking::modes(const std::vector<Eigen::Matrix3d>& rotations,
+                                     std::size_t count,
+                                     ThreadPool& threads) const {
+  const SearchedPart everywhere = part(lattice.whole());
+  std::vector<Turn> turns;
+  for (const Eigen::Matrix3d& rotation : rotations) turns.push_back({rotation, &everywhere});
+  return modes(turns, count, threads);
+}
+
+std::vector<PoseMode> Looking::modes_near(const std::vector<PoseMode>& modes_found,
+                                          double step_rad,
+                                          double reach_mm,
+                                          std::size_t count,
+                                          ThreadPool& threads) const {
+  std::vector<SearchedPart> parts;
+  for (const PoseMode& mode : modes_found) {
+    const Eigen::Vector3d center = mode.room_from_ct * frame.center_ct_mm;
+    parts.push_back(part(lattice.around(center - frame.center_room_mm, reach_mm)));
+  }
+  std::vector<Turn> turns;
+  for (std::size_t i = 0; i < modes_found.size(); ++i)
+    for (const double x : {-step_rad, 0.0, step_rad})
+      for (const double y : {-step_rad, 0.0, step_rad})
+        for (const double z : {-step_rad, 0.0, step_rad})
+          turns.push_back(
+              {rotation_from_angles({x, y, z}) * modes_found[i].room_from_ct.linear(), &parts[i]});
+  return modes(turns, count, threads);
 }
 
 }  // namespace
@@ -361,14 +415,15 @@ bool are_apart(const RegistrationProblem& problem,
 
 PoseSearch::PoseSearch(const RegistrationProblem& problem,
                        const PoseSearchOptions& options,
+                       double silhouette_mm,
                        std::shared_ptr<ThreadPool> threads) {
   throw_if_any(problems(options));
   throw_if_any(problems(problem));
   const MotionLimit searched = searched_range(problem, options);
   const bool is_everywhere = options.orientations == "any";
   std::optional<Looking> first;
-  if (is_everywhere) first.emplace(problem, searched, kFirstPixelsAcross);
-  Looking looking(problem, searched, kPixelsAcross);
+  if (is_everywhere) first.emplace(problem, searched, kFirstPixelsAcross, silhouette_mm);
+  Looking looking(problem, searched, kPixelsAcross, silhouette_mm);
   const double step_rad = is_everywhere ? first->rotation_step_rad : looking.rotation_step_rad;
   parts_ =
       std::make_unique<Parts>(Parts{options,
@@ -394,13 +449,18 @@ std::size_t PoseSearch::rotation_count() const {
 std::vector<PoseMode> PoseSearch::modes() const {
   const auto count = static_cast<std::size_t>(parts_->options.modes);
   ThreadPool& threads = *parts_->threads;
-  std::vector<Eigen::Matrix3d> rotations;
-  if (parts_->first.has_value())
-    for (const PoseMode& mode :
-         parts_->first->modes(parts_->rotations, std::max(count, kFirstModes), threads))
-      add_rotations_about(mode.room_from_ct, parts_->looking.rotation_step_rad, rotations);
-  std::vector<PoseMode> modes = parts_->looking.modes(
-      parts_->first.has_value() ? rotations : parts_->rotations, count, threads);
+  const Looking& looking = parts_->looking;
+  std::vector<PoseMode> modes;
+  if (parts_->first.has_value()) {
+    const Looking& first = *parts_->first;
+    const double step_rad = looking.rotation_step_rad;
+    modes = first.modes(parts_->rotations, std::max(count, kFirstModes), threads);
+    modes =
+        looking.modes_near(modes, step_rad, first.pixel_mm, std::max(count, kSecondModes), threads);
+    modes = looking.modes_near(modes, 0.5 * step_rad, looking.pixel_mm, count, threads);
+  } else {
+    modes = looking.modes(parts_->rotations, count, threads);
+  }
   if (modes.empty())
     throw InputError(
         "search of starts", parts_->searched.range.text(), "no DRR there is like the X-rays");

@@ -57,16 +57,19 @@ struct PoseMode {
 /// Looks for poses everywhere in a range at once. For every rotation of a set, one coarse DRR of
 /// each view is correlated with its X-ray at all shifts; the correlations of all views are added on
 /// one lattice of translations, so that the views triangulate without a choice among their peaks.
-/// DRRs are made anew for depths along the beam at which they would be seen a pixel larger. The
+/// Depths along the beam at which a DRR would be seen a pixel larger are compared apart. The
 /// steps of rotations and translations follow from the coarse pixels. Registrations reach several
 /// steps far, so the search need not be exact. Depends on the problem and the options alone, not on
 /// threads or vector width. \test PoseSearch.FindsAPoseAnywhereInItsRange
 class PoseSearch {
  public:
-  /// The problem must outlive it. InputError where the problem has problems, the options ask for
+  /// `silhouette_mm`: RegistrationOptions::silhouette_mm() of the method that registers; above 0
+  /// only what is near to the CT's silhouette is compared. The problem must outlive the search.
+  /// InputError where the problem has problems, the options ask for
   /// poses that a view's field does not hold, or an X-ray shows nothing.
   PoseSearch(const RegistrationProblem& problem,
              const PoseSearchOptions& options,
+             double silhouette_mm = 0.0,
              std::shared_ptr<ThreadPool> threads = nullptr);
   ~PoseSearch();
   PoseSearch(PoseSearch&&) noexcept;

@@ -8,15 +8,16 @@
 
 #include "base/error.h"
 #include "register/method/prepared_stage.h"
+#include "register/problem/silhouette.h"
 #include "register/problem/target_region.h"
 
 namespace af::registration {
 namespace {
 
+/// An edge is so many coarse pixels wide, at most.
+constexpr double kEdgePx = 2.0;
 /// Smallest coarse pixel, mm on the isocentre plane: registrations find the rest.
 constexpr double kLeastPixelMm = 2.0;
-/// The lattice and each view's places of it take 20 bytes a translation.
-constexpr double kMostTranslations = 4e6;
 /// The centre stays at least this share of its distance away from the source.
 constexpr double kLeastDepthShare = 0.2;
 
@@ -83,17 +84,67 @@ SeenTranslations seen_translations(const RegistrationView& view,
 
 /// The middles of layers within which the pattern's border is seen less than a pixel from where the
 /// middle shows it.
-Steps depth_layers(const SearchedView& searched,
-                   const SeenTranslations& seen,
-                   double source_distance_mm) {
+Steps depth_layers(const SearchedView& searched, const SeenTranslations& seen) {
   const double half_px = 0.5 * std::max(searched.pattern.roi.width, searched.pattern.roi.height);
-  const double layer_mm = 2.0 * (source_distance_mm + seen.nearest) / half_px;
+  const double layer_mm = 2.0 * (searched.distance_mm + seen.nearest) / half_px;
   const double range_mm = seen.farthest - seen.nearest;
   const int layers = std::max(1, static_cast<int>(std::ceil(range_mm / layer_mm)));
   const double thickness_mm = range_mm / layers;
   return {seen.nearest + 0.5 * thickness_mm,
           seen.farthest - 0.5 * thickness_mm,
           std::max(thickness_mm, 1e-3)};
+}
+
+/// The image enlarged about a point of it, by linear interpolation. Beyond its border is its
+/// border.
+Image2d scaled_about(const Image2d& image, const Eigen::Vector2d& fixed_px, double size) {
+  if (size == 1.0) return image;
+  Image2d scaled(image.width, image.height);
+  const auto along = [](double fixed, double by, int at, int count) {
+    return std::clamp(fixed + (at - fixed) / by, 0.0, count - 1.0);
+  };
+  for (int row = 0; row < image.height; ++row) {
+    const double y = along(fixed_px.y(), size, row, image.height);
+    const int above = std::min(static_cast<int>(y), std::max(0, image.height - 2));
+    const int below = std::min(above + 1, image.height - 1);
+    const auto down = static_cast<float>(y - above);
+    for (int column = 0; column < image.width; ++column) {
+      const double x = along(fixed_px.x(), size, column, image.width);
+      const int left = std::min(static_cast<int>(x), std::max(0, image.width - 2));
+      const int right = std::min(left + 1, image.width - 1);
+      const auto across = static_cast<float>(x - left);
+      const auto between = [&](int in_row) {
+        const float first = image.at(left, in_row);
+        return first + across * (image.at(right, in_row) - first);
+      };
+      const float upper = between(above);
+      scaled.at(column, row) = upper + down * (between(below) - upper);
+    }
+  }
+  return scaled;
+}
+
+/// How far the CT reaches from the centre of rotations.
+double radius_about_center_mm(const RegistrationProblem& problem) {
+  double radius_mm = 0.0;
+  for (const Eigen::Vector3d& point : problem.scaling_points_ct)
+    radius_mm = std::max(radius_mm, (point - problem.center_ct_mm).norm());
+  return radius_mm;
+}
+
+/// The same pixels as a detector of their own, which may lie beyond that of the camera.
+View own_detector(const View& view) {
+  CameraGeometry camera = view.camera;
+  camera.detector_origin_point = camera.detector_point(view.roi.column, view.roi.row);
+  camera.size_px = {view.roi.width, view.roi.height};
+  return View::whole_detector(camera);
+}
+
+/// The square of coarse pixels that shows everything this near to a point of the room.
+View square_about(const CameraGeometry& coarse, const Eigen::Vector3d& point, double radius_mm) {
+  const Eigen::Vector2i middle = coarse.project(point).array().round().cast<int>();
+  const int half = static_cast<int>(std::ceil(radius_mm * coarse.pixels_per_mm(point))) + 1;
+  return {coarse, {middle.x() - half, middle.y() - half, 2 * half + 1, 2 * half + 1}};
 }
 
 /// Zeros that the X-ray needs around it, so that the pattern stays within at all shifts.
@@ -105,89 +156,29 @@ int border_for(const SeenTranslations& seen, const RegionOfInterest& pattern, co
                    seen.last.y() + pattern.height - whole.roi.height});
 }
 
+/// `first`: where the pattern lies in the X-ray at the first shift.
 std::vector<SearchedView::Place> places_of(const SeenTranslations& seen,
                                            const Steps& depths,
-                                           const ShiftWindow& window) {
+                                           const Eigen::Vector2i& first) {
   std::vector<SearchedView::Place> places;
   for (std::size_t i = 0; i < seen.shifts.size(); ++i) {
     const Eigen::Vector2d at = seen.shifts[i] - seen.first.cast<double>();
-    // The last shift has no neighbour: rounding must not make it a corner.
-    const Eigen::Vector2d corner =
-        at.array().floor().min(Eigen::Array2d(window.columns - 2, window.rows - 2));
-    places.push_back(
-        {depths.nearest(seen.depths[i]),
-         static_cast<std::uint32_t>(corner.y()) * static_cast<std::uint32_t>(window.columns) +
-             static_cast<std::uint32_t>(corner.x()),
-         static_cast<float>(at.x() - corner.x()),
-         static_cast<float>(at.y() - corner.y())});
+    const Eigen::Vector2i corner = at.array().floor().cast<int>();
+    places.push_back({depths.nearest(seen.depths[i]),
+                      first.x() + corner.x(),
+                      first.y() + corner.y(),
+                      static_cast<float>(at.x() - corner.x()),
+                      static_cast<float>(at.y() - corner.y())});
   }
   return places;
 }
 
 }  // namespace
 
-Steps::Steps(double low, double high, double widest)
-    : count(std::max(1, 1 + static_cast<int>(std::ceil((high - low) / widest - 1e-9)))) {
-  step = count > 1 ? (high - low) / (count - 1) : 0.0;
-  first = count > 1 ? low : 0.5 * (low + high);
-}
-
-int Steps::nearest(double value) const {
-  if (count == 1) return 0;
-  return static_cast<int>(std::lround(std::clamp((value - first) / step, 0.0, count - 1.0)));
-}
-
-TranslationLattice::TranslationLattice(const MotionRange& range, double step_mm)
-    : axes{Steps(range.low.translation_mm.x(), range.high.translation_mm.x(), step_mm),
-           Steps(range.low.translation_mm.y(), range.high.translation_mm.y(), step_mm),
-           Steps(range.low.translation_mm.z(), range.high.translation_mm.z(), step_mm)} {
-  const double count = static_cast<double>(axes[0].count) * axes[1].count * axes[2].count;
-  if (count > kMostTranslations)
-    throw InputError("search range",
-                     range.text(),
-                     "must have at most four million translations, a coarse pixel apart");
-}
-
-std::size_t TranslationLattice::size() const {
-  return static_cast<std::size_t>(axes[0].count) * static_cast<std::size_t>(axes[1].count) *
-         static_cast<std::size_t>(axes[2].count);
-}
-
-std::array<int, 3> TranslationLattice::node(std::size_t index) const {
-  const auto columns = static_cast<std::size_t>(axes[0].count);
-  const auto rows = static_cast<std::size_t>(axes[1].count);
-  return {static_cast<int>(index % columns),
-          static_cast<int>(index / columns % rows),
-          static_cast<int>(index / (columns * rows))};
-}
-
-Eigen::Vector3d TranslationLattice::translation(std::size_t index) const {
-  const std::array<int, 3> at = node(index);
-  return {axes[0].at(at[0]), axes[1].at(at[1]), axes[2].at(at[2])};
-}
-
-Eigen::Vector3d TranslationLattice::middle() const {
-  Eigen::Vector3d middle;
-  for (int axis = 0; axis < 3; ++axis) {
-    const Steps& steps = axes[static_cast<std::size_t>(axis)];
-    middle[axis] = 0.5 * (steps.at(0) + steps.at(steps.count - 1));
-  }
-  return middle;
-}
-
-bool TranslationLattice::is_maximum(std::span<const float> values, std::size_t index) const {
-  const std::array<int, 3> at = node(index);
-  std::size_t stride = 1;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    if (at[axis] > 0 && values[index - stride] > values[index]) return false;
-    if (at[axis] + 1 < axes[axis].count && values[index + stride] > values[index]) return false;
-    stride *= static_cast<std::size_t>(axes[axis].count);
-  }
-  return true;
-}
-
-double pixel_mm_of(const RegistrationProblem& problem, int pixels_across) {
+double pixel_mm_of(const RegistrationProblem& problem, int pixels_across, double silhouette_mm) {
   double pixel_mm = kLeastPixelMm;
+  if (silhouette_mm > 0.0)
+    return std::max(pixel_mm, 2.0 * radius_about_center_mm(problem) / pixels_across);
   for (const RegistrationView& view : problem.views) {
     const RegionOfInterest roi = view.widest_view().roi;
     const double mm =
@@ -197,14 +188,64 @@ double pixel_mm_of(const RegistrationProblem& problem, int pixels_across) {
   return pixel_mm;
 }
 
-void SearchedView::add_likeness(std::span<const float> likeness, std::span<float> sums) const {
-  const auto below = static_cast<std::size_t>(shift_window.columns);
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    const Place& place = places[i];
+SearchedView::Part SearchedView::part(std::span<const std::size_t> nodes) const {
+  const Place& any = places[nodes.front()];
+  Place low = any;
+  Place high = any;
+  for (const std::size_t node : nodes) {
+    const Place& place = places[node];
+    low.depth = std::min(low.depth, place.depth);
+    high.depth = std::max(high.depth, place.depth);
+    low.column = std::min(low.column, place.column);
+    high.column = std::max(high.column, place.column);
+    low.row = std::min(low.row, place.row);
+    high.row = std::max(high.row, place.row);
+  }
+  // A place lies between a shift and the next.
+  return {{low.column, low.row, high.column - low.column + 2, high.row - low.row + 2},
+          low.depth,
+          high.depth - low.depth + 1};
+}
+
+void SearchedView::compare(const Part& part,
+                           const Image2d& drr,
+                           std::span<const Eigen::Vector2d> cuts_px,
+                           std::span<float> likeness) const {
+  const Eigen::Vector2d center_px =
+      pattern.camera.project(pattern.camera.source_point + distance_mm * along_beam);
+  const std::size_t shifts = part.window.size();
+  for (int i = 0; i < part.depths; ++i) {
+    const std::span<float> here = likeness.subspan(static_cast<std::size_t>(i) * shifts, shifts);
+    const double size = distance_mm / (distance_mm + depths.at(part.first_depth + i));
+    const Image2d seen = scaled_about(drr, center_px, size);
+    const EdgeImage edges(seen, {}, 0);
+    if (silhouette_px == 0.0) {
+      correlate(edges, xray, part.window, here);
+      continue;
+    }
+    std::vector<Eigen::Vector2d> cuts(cuts_px.begin(), cuts_px.end());
+    for (Eigen::Vector2d& cut : cuts) cut = center_px + size * (cut - center_px);
+    correlate_within(
+        silhouette(seen, silhouette_px, cuts), edges, xray, xray_squares, part.window, here);
+  }
+}
+
+void SearchedView::add_likeness(const Part& part,
+                                std::span<const std::size_t> nodes,
+                                std::span<const float> likeness,
+                                std::span<float> sums) const {
+  const ShiftWindow& window = part.window;
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    const Place& place = places[nodes[i]];
     const float* const at =
-        likeness.data() + static_cast<std::size_t>(place.layer) * shifts() + place.shift;
+        likeness.data() +
+        static_cast<std::ptrdiff_t>(place.depth - part.first_depth) *
+            static_cast<std::ptrdiff_t>(window.size()) +
+        static_cast<std::ptrdiff_t>(place.row - window.first_row) * window.columns +
+        (place.column - window.first_column);
     const float upper = at[0] + place.right * (at[1] - at[0]);
-    const float lower = at[below] + place.right * (at[below + 1] - at[below]);
+    const float* const next = at + window.columns;
+    const float lower = next[0] + place.right * (next[1] - next[0]);
     sums[i] += upper + place.below * (lower - upper);
   }
 }
@@ -233,7 +274,8 @@ SearchedView searched_view(const RegistrationProblem& problem,
                            const Eigen::Vector3d& center,
                            const RegistrationView& view,
                            const TranslationLattice& lattice,
-                           double pixel_mm) {
+                           double pixel_mm,
+                           double silhouette_mm) {
   const CameraGeometry& camera = view.view.camera;
   const Eigen::Vector3d at_middle = center + lattice.middle();
   const double pixels_per_mm = camera.pixels_per_mm(problem.isocenter_point);
@@ -241,15 +283,18 @@ SearchedView searched_view(const RegistrationProblem& problem,
   const CoarseRenderer coarse = coarse_renderer(view, pixel_step / pixels_per_mm);
   const StageGrid grid{pixel_step, 1.0, coarse.blur_sigma_mm * pixels_per_mm};
   const View whole = stage_view(View::whole_detector(camera), grid);
-  SearchedView searched{stage_view(widest_view_at(problem, view, lattice.middle()), grid),
-                        coarse.renderer,
-                        {},
-                        (at_middle - camera.source_point).normalized(),
-                        {0.0, 0.0, 1.0},
-                        {},
-                        {}};
+  const View pattern = silhouette_mm > 0.0
+                           ? square_about(whole.camera, at_middle, radius_about_center_mm(problem))
+                           : stage_view(widest_view_at(problem, view, lattice.middle()), grid);
+  SearchedView searched;
+  searched.pattern = own_detector(pattern);
+  searched.renderer = coarse.renderer;
+  searched.along_beam = (at_middle - camera.source_point).normalized();
+  searched.distance_mm = (at_middle - camera.source_point).norm();
+  if (silhouette_mm > 0.0)
+    searched.silhouette_px = std::max(kEdgePx, silhouette_mm * pixels_per_mm / pixel_step);
   const SeenTranslations seen = seen_translations(view, whole, searched, center, lattice);
-  searched.depths = depth_layers(searched, seen, (at_middle - camera.source_point).norm());
+  searched.depths = depth_layers(searched, seen);
 
   const int border = border_for(seen, searched.pattern.roi, whole);
   const SimilarityReference xray =
@@ -257,11 +302,9 @@ SearchedView searched_view(const RegistrationProblem& problem,
   searched.xray = EdgeImage(xray.xray, xray.used, border);
   if (!(searched.xray.mean_energy() > 0.0))
     throw InputError(view_name(view) + "X-ray", "no edges", "a search needs an image of something");
-  searched.shift_window = {seen.first.x() + border,
-                           seen.first.y() + border,
-                           seen.last.x() - seen.first.x() + 1,
-                           seen.last.y() - seen.first.y() + 1};
-  searched.places = places_of(seen, searched.depths, searched.shift_window);
+  if (silhouette_mm > 0.0) searched.xray_squares = quarter_squares(searched.xray);
+  searched.places =
+      places_of(seen, searched.depths, {seen.first.x() + border, seen.first.y() + border});
   return searched;
 }
 

@@ -557,7 +557,7 @@ RegistrationRecord Registration::run(const RigidTransform& start_room_from_ct,
 
 void Registration::look_for_starts(const PoseSearchOptions& options,
                                    const std::shared_ptr<ThreadPool>& threads) {
-  pose_search.emplace(*problem, options, threads);
+  pose_search.emplace(*problem, options, method.silhouette_mm(), threads);
 }
 
 RegistrationRecord Registration::run_everywhere(std::int64_t start_index) {

@@ -9,7 +9,7 @@ af_add_test(
           unit/register/problem/target_region_test.cpp
           unit/register/problem/multi_view_objective_test.cpp unit/register/method/correction_test.cpp
           unit/register/search/edge_image_test.cpp unit/register/search/pose_search_test.cpp
-          unit/register/search/rotation_set_test.cpp
+          unit/register/search/rotation_set_test.cpp unit/register/search/translation_lattice_test.cpp
           unit/register/verdict/registration_test.cpp unit/register/verdict/target_examiner_test.cpp
           unit/register/verdict/verdict_test.cpp
           unit/register/verdict/pose_covariance_test.cpp unit/register/verdict/uncertainty_estimator_test.cpp

@@ -94,6 +94,36 @@ TEST(EdgeCorrelation, IsTheSumOfProductsOnEveryVectorWidth) {
   force_vector_width(std::nullopt);
 }
 
+TEST(EdgeCorrelation, WithinAPartIgnoresWhatIsAroundIt) {
+  const EdgeImage image(test::noise_image(70, 40, 5), {}, 2);
+  const EdgeImage pattern(test::noise_image(17, 12, 6), {}, 0);
+  const std::vector<std::int16_t> squares = quarter_squares(image);
+  std::vector<std::uint8_t> used(17 * 12, 0);
+  for (int row = 3; row < 9; ++row)
+    for (int column = 2; column < 12; ++column)
+      used[static_cast<std::size_t>(row * 17 + column)] = 1;
+  constexpr int kColumns = 57;  // more than any kernel sums at a time
+  constexpr int kRows = 4;
+  const double of_pattern = static_cast<double>(pattern.energy(2, 3, 10, 6));
+  const double floor = 0.25 * image.mean_energy() * 60;
+  for (const VectorWidth width : supported_vector_widths()) {
+    force_vector_width(width);
+    std::vector<float> likeness(kColumns * kRows);
+    correlate_within(used, pattern, image, squares, {1, 3, kColumns, kRows}, likeness);
+    for (int row = 0; row < kRows; ++row)
+      for (int column = 0; column < kColumns; ++column) {
+        const double both =
+            of_pattern *
+            std::max(static_cast<double>(image.energy(3 + column, 6 + row, 10, 6)), floor);
+        const double expected =
+            product(pattern, 2, 3, image, 3 + column, 6 + row, 10, 6) / std::sqrt(both);
+        // Quarters of squares are rounded down by at most 3/4, and edges are 51 steps long (RMS).
+        EXPECT_NEAR(likeness[static_cast<std::size_t>(row * kColumns + column)], expected, 1e-3);
+      }
+  }
+  force_vector_width(std::nullopt);
+}
+
 TEST(EdgeCorrelation, FindsAPatternWhereItWasCutOut) {
   const Image2d image = test::noise_image(50, 44, 4);
   const EdgeImage edges(image, {}, 6);

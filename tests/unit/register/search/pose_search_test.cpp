@@ -97,6 +97,27 @@ TEST(PoseSearch, FindsAPoseFarAlongABeamThroughASmallRegionAndAMask) {
   EXPECT_LT(distance_mm(small, search.modes().front().room_from_ct), 10.0);
 }
 
+TEST(PoseSearch, FindsABodyAmongOthersWithinItsSilhouette) {
+  // Beside the body lie two others, which its CT does not show.
+  test::SmallCase small = small_case_at(PoseParameters::from_deg_and_mm({-8, 6, 11, 9, -7, 12}));
+  const std::vector<RegistrationView>& views = small.problem->views;
+  for (std::size_t view = 0; view < views.size(); ++view) {
+    Image2d& xray = small.problem->views[view].xray;
+    for (int row = 0; row < xray.height; ++row)
+      for (int column = 0; column < xray.width; ++column) {
+        if (column < 9) xray.at(column, row) += 2.0f;
+        if (row > 40) xray.at(column, row) += 1.5f;
+      }
+  }
+  PoseSearchOptions options;
+  options.translation_mm = {20.0, 20.0, 20.0};
+  for (const char* orientations : {"field", "any"}) {
+    options.orientations = orientations;
+    const PoseSearch search(*small.problem, options, 4.0);
+    EXPECT_LT(distance_mm(small, search.modes().front().room_from_ct), 8.0) << orientations;
+  }
+}
+
 TEST(PoseSearch, ModesOfASmallTargetDifferByTheirRotation) {
   const test::SmallCase small = small_case_at({});
   const RigidTransform here = RigidTransform::Identity();
@@ -119,7 +140,7 @@ TEST(PoseSearch, IsTheSameOnEveryVectorWidthAndNumberOfThreads) {
   const std::vector<PoseMode> expected = PoseSearch(*small.problem, options).modes();
   for (const VectorWidth width : supported_vector_widths()) {
     force_vector_width(width);
-    const PoseSearch search(*small.problem, options, std::make_shared<ThreadPool>(3));
+    const PoseSearch search(*small.problem, options, 0.0, std::make_shared<ThreadPool>(3));
     const std::vector<PoseMode> modes = search.modes();
     ASSERT_EQ(modes.size(), expected.size());
     for (std::size_t i = 0; i < modes.size(); ++i) {
