@@ -22,7 +22,7 @@
 namespace af {
 namespace {
 
-/// As `readelf --notes` shows it: SHA-1, or shorter by other linkers.
+/// `readelf --notes` is the oracle. GNU ld writes a SHA-1 hash, other linkers write fewer bytes.
 TEST(BuildId, IsThatOfThisProgram) {
   EXPECT_GE(build_id().size(), 16u);
   EXPECT_EQ(build_id().find_first_not_of("0123456789abcdef"), std::string::npos);

@@ -61,7 +61,7 @@ TEST(ContainedWork, WhatIsThrownOrRefusedIsNotDone) {
       "refused it");
 }
 
-// 4 GiB for one byte: more than the limit, less than what an allocator refuses by itself.
+// 4 GiB for one byte exceed the limit, but the allocator alone would still grant them.
 TEST(ContainedWork, IsEndedWhenItAsksForFarMoreMemoryThanItsBytesAreWorth) {
   EXPECT_FALSE(contained_work(1, [](std::span<char> bytes) {
                  std::vector<char> much(std::size_t{1} << 32, 'a');
@@ -70,7 +70,7 @@ TEST(ContainedWork, IsEndedWhenItAsksForFarMoreMemoryThanItsBytesAreWorth) {
                }).is_done);
 }
 
-// As the watchdog's thread may have, or another that reads.
+// The watchdog's thread, or another reader, may hold such a lock.
 TEST(ContainedWork, IsEndedWhenItWaitsForWhatAnotherThreadHasLocked) {
   std::mutex mutex;
   std::latch is_locked(1), is_over(1);

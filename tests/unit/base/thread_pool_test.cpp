@@ -125,7 +125,7 @@ TEST(ThreadPool, RefusesNegativeAndAbsurdNumbers) {
   EXPECT_EQ(thread_problems(1025).size(), 1u);
 }
 
-/// Whether `works` gives true in a copy of this process; an alarm ends a copy that hangs.
+/// Whether `works` returns true in a fork of this process. An alarm ends a fork that hangs.
 bool in_copy(const std::function<bool()>& works) {
   const pid_t copy = ::fork();
   if (copy == 0) {

@@ -35,7 +35,7 @@ TEST(BeginningOf, CutsNoCharacterInTwo) {
     EXPECT_GE(beginning_of(text, bytes).size() + 3, std::min(bytes, text.size())) << bytes;
   }
   EXPECT_EQ(beginning_of(text, text.size()), text);
-  // Bytes that are no characters stay: a message shows them as they are.
+  // Bytes that form no character stay: a message shows them as they are.
   EXPECT_EQ(beginning_of("\x80\x81\x82\x83\x84", 4), "\x80\x81\x82\x83");
 }
 

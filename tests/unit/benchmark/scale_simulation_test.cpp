@@ -45,7 +45,7 @@ TEST(ScaleSimulation, OwnShardsTakeRowsOffRankZero) {
 
 TEST(ScaleSimulation, CountsEveryRowOnceAndEveryRequest) {
   const SimulatedRun result = run(2, 10, kFree, RowsGo::ToRankZero);
-  // Rank 1's rows are at most all; rank 0's own send nothing. 24 bytes a request.
+  // At most all rows come from rank 1; rank 0 sends its own nowhere. A request takes 24 bytes.
   EXPECT_LE(result.manager_bytes, 10 * 100.0 + static_cast<double>(result.requests) * 24.0);
   EXPECT_GE(result.requests, 2);
 }

@@ -41,7 +41,7 @@ OrbitScene random_scene(HashRandom& random) {
   return scene;
 }
 
-/// A pose of the range: every other one with some parameters at their bounds.
+/// A pose within the range. Every other one has some parameters at their bounds.
 PoseParameters pose_or_bounds(const MotionRange& range, HashRandom& random) {
   const double at_bounds = random.uniform() < 0.5 ? 0.6 : 0.0;
   const auto between = [&](double low, double high) {
@@ -114,7 +114,7 @@ TEST(ViewpointCylinder, ACameraTurnedToAColumnLooksFromThere) {
     const Eigen::Vector3d source = ct_from_room * camera.source_point;
     const auto place = cylinder.columns_of({source, isocenter_ct - source});
     constexpr double kRounding = 1e-9;
-    // The outermost may be beyond by a rounding.
+    // Rounding may put the outermost one beyond the columns.
     if (!place) continue;
     EXPECT_NEAR(place->lower + place->weight, i, kRounding);
     const LightSlab& column = cylinder.columns()[static_cast<std::size_t>(i)];

@@ -43,7 +43,7 @@ struct Options {
   }
 };
 
-/// Options of lists before a word that is none.
+/// Options that take lists, and a positional word that must not join the list before it.
 struct ListOptions {
   std::vector<int> sides;
   std::optional<std::array<double, 3>> point;

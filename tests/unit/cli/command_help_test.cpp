@@ -60,7 +60,7 @@ CommandHelp shown_help() {
   return command_help(app);
 }
 
-/// An option that no struct describes, of a command.
+/// The help of an option of `command` that no struct describes.
 OptionHelp plain_help(CLI::App& command, CLI::App& program) {
   int nodes = 0;
   command.add_option("--nodes", nodes, "");
@@ -71,7 +71,7 @@ OptionHelp plain_help(CLI::App& command, CLI::App& program) {
   return {};
 }
 
-// Options of a later program may stand where those of an earlier one stood in memory.
+// A later program's options may lie in memory where an earlier one's lay.
 TEST(CommandHelp, HasNothingOfAnotherProgramOrCommand) {
   for (int turn = 0; turn < 20; ++turn) {
     auto described = std::make_unique<CLI::App>("described");

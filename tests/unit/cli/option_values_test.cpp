@@ -28,8 +28,7 @@ struct Options {
   std::string text;
 };
 
-/// The message for a command line, empty when it is accepted; both of the program and of a
-/// subcommand.
+/// The message about the options of a subcommand; empty when they are accepted.
 std::string complaint(const std::string& words) {
   CLI::App app{"test"};
   Options options;

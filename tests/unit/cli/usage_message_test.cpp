@@ -11,7 +11,7 @@
 namespace af::cli {
 namespace {
 
-/// A program as ours are: options, a required one, and sub-commands.
+/// A program like ours: options, a required one among them, and sub-commands.
 std::string message_for(const std::string& line, bool has_commands = false) {
   CLI::App app{"test", "program"};
   std::array<double, 3> rotation{};

@@ -54,7 +54,7 @@ TEST(AttenuationVolume, APartHoldsTheVoxelsOfItsBox) {
   EXPECT_EQ(std::count(part.voxels.begin(), part.voxels.end(), 1500), 3 * 4 * 2);
   EXPECT_EQ(std::count(part.voxels.begin(), part.voxels.end(), 0),
             std::ssize(part.voxels) - 3 * 4 * 2);
-  // Of the CT it reaches into the air about the volume.
+  // A part of the CT reaches into the air around the volume.
   const VolumePart of_ct = part_within(ct, {}, box);
   EXPECT_EQ(of_ct.grid.size, (std::array<int, 3>{3 + 2, 10 + 2, 2 + 2}));
   EXPECT_EQ(std::count(of_ct.voxels.begin(), of_ct.voxels.end(), 1500), 3 * 4 * 2);

@@ -44,7 +44,7 @@ std::array<double, 3> moments_along(const AttenuationVolume& volume, std::size_t
 
 constexpr double kSigmaMm = 3.2;
 
-/// `blur`: by kSigmaMm, rounding `roundings` times.
+/// `blur` must blur by kSigmaMm and round `roundings` times.
 template <typename Blur>
 void expect_variance(int roundings, const Blur& blur) {
   const std::array<int, 3> factors{2, 1, 1};  // 1.6 / 0.8, / 1.1 and / 2.5, rounded down
@@ -94,7 +94,7 @@ TEST(VolumeBlur, OfABlurredVolumeSpreadsAVoxelByTheVarianceOfBoth) {
   });
 }
 
-/// Of every width the same bits, of sizes that fill no vector.
+/// The volume's extents are no multiples of a vector's width.
 TEST(VolumeBlur, EveryVectorWidthGivesTheSameBits) {
   const AttenuationVolume fine(box_phantom(uneven_grid(), {3, 4, 5}, {27, 24, 19}, 300), {});
   for (const double sigma_mm : {0.9, 2.7}) {

@@ -62,7 +62,7 @@ TEST(BodyMask, RemovesATableThatTheBodyTouchesAndKeepsLungs) {
       left += hu[at] > -1000 ? 1u : 0u;
     }
   }
-  // Where the shell touches, what lies within the 3.5 mm that are given back stays: a lens of about
+  // The mask gives back 3.5 mm around the body. Where the shell touches, this keeps a lens of about
   // 24 mm.
   EXPECT_LT(left, 12u * 2u * 40u) << "of " << 12 * 2 * 2 * 100;
 }

@@ -67,7 +67,7 @@ std::vector<fs::path> written(const fs::path& folder) {
   return paths;
 }
 
-/// One byte of a file is another one; how long the file is stays.
+/// Changes one byte of a file and keeps its length.
 void change_byte(const fs::path& path, std::size_t place) {
   std::string bytes = read_own_text_file(path);
   ASSERT_LT(place, bytes.size());
@@ -118,7 +118,7 @@ TEST(CtFacts, AreReadAnewWhenAByteOfAnyFileChanges) {
   const fs::path slice = *fs::directory_iterator(folder / "dicom");
   change_byte(slice, fs::file_size(slice) - 20);
   EXPECT_NE(hash_of("dicom"), hash);
-  // A file that is no slice is named by a warning.
+  // A warning names a file that is not a slice.
   test::write_input(folder / "dicom/notes.txt", "none");
   EXPECT_THAT(told_of(folder / "dicom").warnings, ElementsAre(HasSubstr("notes.txt")));
   EXPECT_EQ(cache.entries().size(), 5U);
@@ -192,7 +192,7 @@ TEST(CtFacts, OfAKnownCtKeepItsFilesFromBeingReplaced) {
     (void)told_of(folder / "dicom");
   };
   look();
-  // The same bytes in other files: what was noted of the first ones does not count for them.
+  // The same bytes in new files: what was noted about the old files does not hold for them.
   for (const fs::path& file : files) {
     fs::copy_file(file, folder / "copy");
     fs::rename(folder / "copy", file);

@@ -37,7 +37,7 @@ struct StoredOrder {
   std::array<bool, 3> reversed = {false, false, false};
 };
 
-/// The same CT, its voxels in another order.
+/// The same CT with its voxels in another order.
 CtVolume stored_in(const CtVolume& ct, const StoredOrder& order) {
   CtVolume stored;
   Eigen::Vector3d first = Eigen::Vector3d::Zero();
@@ -56,18 +56,18 @@ CtVolume stored_in(const CtVolume& ct, const StoredOrder& order) {
   for (at[2] = 0; at[2] < size[2]; ++at[2])
     for (at[1] = 0; at[1] < size[1]; ++at[1])
       for (at[0] = 0; at[0] < size[0]; ++at[0]) {
-        std::array<int, 3> of{};
+        std::array<int, 3> source{};
         for (std::size_t a = 0; a < 3; ++a)
-          of[static_cast<std::size_t>(order.axis[a])] =
+          source[static_cast<std::size_t>(order.axis[a])] =
               order.reversed[a] ? size[a] - 1 - at[a] : at[a];
         hu.push_back(ct.hu[static_cast<std::size_t>(
-            of[0] + ct.grid.size[0] * (of[1] + ct.grid.size[1] * of[2]))]);
+            source[0] + ct.grid.size[0] * (source[1] + ct.grid.size[1] * source[2]))]);
       }
   stored.hu = SharedArray<std::int16_t>(std::move(hu));
   return stored;
 }
 
-/// What is drawn for one run after the other.
+/// Random choices for one run after another.
 class Draw {
  public:
   double between(double low, double high) {
@@ -108,7 +108,7 @@ class Draw {
     ct.hu = SharedArray<std::int16_t>(std::move(hu));
     return ct;
   }
-  /// The same voxels in another place, of another size, turned or mirrored; or mirrored voxels.
+  /// The same voxels moved, resized, turned or mirrored; or the same grid with mirrored voxels.
   CtVolume changed(const CtVolume& ct) {
     CtVolume other = ct;
     const int axis = below(3);
@@ -192,7 +192,7 @@ TEST(CtIdentity, IsThatOfVoxelsAndOfEveryCornersPlace) {
 
 TEST(CtIdentity, OfAThousandRewrittenCtsIsThatOfTheSameAndOfNoOtherOnes) {
   constexpr int kRuns = 1000;
-  // With what single precision takes from 500 mm, 3e-5, still the same place.
+  // Still the same place after single precision has rounded 500 mm by 3e-5 mm.
   constexpr double kHardlyMm = 9e-4;
   const ScratchFolder folder;
   Draw draw;
@@ -201,8 +201,8 @@ TEST(CtIdentity, OfAThousandRewrittenCtsIsThatOfTheSameAndOfNoOtherOnes) {
     const CtVolume ct = draw.ct();
     CtVolume same = ct;
     if (draw.below(2) == 1) same.grid.origin_mm += kHardlyMm * draw.direction();
-    const auto again = [&](const CtVolume& of) {
-      return written_and_read(stored_in(of, draw.order()), draw.below(kFormats), folder.path());
+    const auto again = [&](const CtVolume& volume) {
+      return written_and_read(stored_in(volume, draw.order()), draw.below(kFormats), folder.path());
     };
     ASSERT_EQ(difference(ct, again(same)), "");
     ASSERT_NE(difference(ct, again(draw.changed(ct))), "");

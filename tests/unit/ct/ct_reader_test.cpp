@@ -345,7 +345,8 @@ TEST(CtReader, PaddingIsAirWhateverItsValueWouldMean) {
         });
     std::vector<std::string> warnings;
     expect_same_ct(expected, read_ct(folder / "ct", {}, &warnings));
-    // 1 of 3 to 12 in each of 5 slices; told where the value would not have been air by itself.
+    // 12 padded pixels in each of 5 slices. A warning is due only where the value would not already
+    // be air.
     const bool is_told = padding.stored > 0;
     EXPECT_EQ(warnings.size(), is_told ? 1U : 0U);
     EXPECT_THAT(warnings, testing::Each(HasSubstr("60 voxels of PixelPaddingValue")));
@@ -353,7 +354,7 @@ TEST(CtReader, PaddingIsAirWhateverItsValueWouldMean) {
     raw.values = "raw";
     raw.raw_slope_per_mm = 1e-5;
     raw.raw_offset_per_mm = 0.02;
-    EXPECT_EQ(read_ct(folder / "ct", raw).hu[0], -1000) << "whatever voxels hold";
+    EXPECT_EQ(read_ct(folder / "ct", raw).hu[0], -1000) << "whatever the voxels hold";
   }
 }
 
@@ -484,7 +485,7 @@ TEST(CtReader, PositionsThatWereRoundedAreThoseOfEvenSlices) {
   };
   std::vector<std::string> warnings;
   const CtVolume found = read_ct(series("tenths", 0.1, 99), {}, &warnings);
-  // What computing with the rounded ones leaves of them.
+  // Traces that arithmetic on rounded positions leaves in their last digits.
   write_dicom_series(ct, folder / "traces", [&](int slice, test::DicomTestFile& file) {
     const double z = std::round(6.25 * slice) / 10.0;
     file.set_text({0x0020, 0x0032}, "DS", position(-31.25, 12.5, z) + "0000004");
@@ -1011,7 +1012,7 @@ TEST(CtReader, ANiftiSlopeThatIsNoNumberIsNone) {
   const float infinity = std::numeric_limits<float>::infinity();
   for (const float slope : {nan, infinity, 0.0f}) {
     const ScratchFolder folder;
-    // With any intercept, which nibabel leaves out together with the slope.
+    // The intercept does not matter: nibabel leaves it out together with the slope.
     const fs::path path = nifti_with<float>(112, {slope, nan})(folder.path());
     expect_same_ct(asymmetric_ct(small_grid()), read_ct(path));
   }
@@ -1024,8 +1025,9 @@ Eigen::Matrix3d leaning_axes(double cosine) {
   return axes;
 }
 
-// A CT 6 x 5 x 4 voxels wide: of 5 x 0.9 mm along the leaning axis, so a cosine c moves corners by
-// half of 4.5 c mm along the first axis and by half of 4.8 c mm along the second.
+// The outer voxel centres are 5 x 0.9 mm apart along the leaning axis and 6 x 0.8 mm along the
+// first. So a cosine c moves corners by half of 4.5 c mm along the first axis and by half of 4.8 c
+// mm along the second.
 TEST(CtReader, TakesTheNearestUprightAxesInEveryFormat) {
   for (const double cosine : {5e-5, 2e-4, 9e-4, 1.1e-3}) {
     SCOPED_TRACE(cosine);
@@ -1116,7 +1118,7 @@ TEST(CtReader, TurnsEverySpaceOfANrrdIntoLps) {
   }
 }
 
-/// The calling process with decimal commas while it lives; none where the locale cannot be made.
+/// Gives the process decimal commas for its lifetime, unless the locale cannot be made.
 class CommaLocale {
  public:
   CommaLocale() {
@@ -1214,7 +1216,8 @@ TEST(CtReader, DecodesCompressedDicomPixels) {
   expect_same_ct(ct, read_ct(folder / "dicom"));
 }
 
-// What a pose in DICOM is told apart by: of the series that is read, whatever lies beside it.
+// A pose in DICOM names its frame of reference. It must be that of the series read, whatever lies
+// beside it.
 TEST(CtReader, GivesTheFrameOfReferenceOfTheSeriesThatIsRead) {
   const ScratchFolder folder;
   const CtVolume ct = asymmetric_ct(small_grid());
@@ -1224,7 +1227,8 @@ TEST(CtReader, GivesTheFrameOfReferenceOfTheSeriesThatIsRead) {
       file.set_fragment("1.2.840.10008.1.2.5", rle_encoded(std::vector<std::int16_t>(42)));
     };
   };
-  // Names that come first are of the other series, of no image and of no content.
+  // The names that sort first belong to the other series, to a file without an image and to an
+  // empty file.
   write_dicom_series(ct, folder / "ct", in_frame("5.1"), "1.2.1", "A");
   write_dicom_series(ct, folder / "ct", in_frame("5.2"), "1.2.2", "B");
   test::DicomTestFile report;

@@ -21,7 +21,7 @@ CtGrid small_grid();
 /// Called with each slice (counted from the foot) before it is written; may change or spoil it.
 using SliceEdit = std::function<void(int slice, DicomTestFile& file)>;
 
-/// Writes a CT as a DICOM series, file names in an order that says nothing of the position. The
+/// Writes a CT as a DICOM series, with file names whose order says nothing about positions. The
 /// grid's third axis must be the cross product of the others.
 void write_dicom_series(const CtVolume& ct,
                         const std::filesystem::path& folder,

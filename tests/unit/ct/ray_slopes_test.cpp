@@ -21,7 +21,7 @@ namespace {
 
 using test::cube_grid;
 
-/// Of rotations per rad, and of translations per mm.
+/// Slopes by rotations per rad, then by translations per mm.
 using SixSlopes = Eigen::Matrix<double, 6, 1>;
 
 /// A ray by two of its points, and the part of it that counts, as in RayFan.
@@ -82,7 +82,7 @@ struct SlopeProducts {
   [[nodiscard]] double relative_distance(int k) const {
     return std::sqrt((aa[k] - 2.0 * ab[k] + bb[k]) / bb[k]);
   }
-  /// Of b in a, by least squares.
+  /// The factor by which b fits a best, by least squares.
   [[nodiscard]] double gain(int k) const { return ab[k] / bb[k]; }
 };
 
@@ -246,8 +246,8 @@ TEST(RayCasterSlopes, OfAnEllipsoidAreThoseOfItsChords) {
     if (closed_form(ray) < 20.0 * 0.026) continue;
     products.add(cast_slopes(volume, ray, 0.1), differences(closed_form, ray, 1e-4));
   }
-  // Two cells of a surface of voxels say how it is tilted where a ray crosses it: tens of percent
-  // off, without bias.
+  // Where a ray crosses a surface of voxels, two cells decide the surface's tilt. It is tens of
+  // percent off, but without bias.
   for (int k = 0; k < 6; ++k) EXPECT_NEAR(products.gain(k), 1.0, 0.05) << "parameter " << k;
 }
 
@@ -287,8 +287,8 @@ TEST(RayCasterSlopes, OfABodyCutByTheEdgeOfTheCtAreThoseOfItsChords) {
 
 TEST(RayCasterSlopes, AreFiniteAlongTheFacesOfTheVolume) {
   const AttenuationVolume volume(cut_body(), {});
-  // Enters through the face that it runs along: half a voxel beside the cube's, and a thousandth of
-  // one within.
+  // The ray enters through the face that it runs along. That face lies half a voxel outside the
+  // cube's; the ray runs a thousandth of a voxel inside it.
   constexpr double kFaceMm = -20.2495;
   for (const double tilt : {0.0, 1e-300, 1e-12, 1e-5, 1e-2}) {
     const SixSlopes found = cast_slopes(

@@ -25,7 +25,7 @@ TEST(MembersInUse, KeepsThoseThatWereUsedLast) {
       3);
   for (const std::size_t member : {0u, 1u, 2u, 0u, 3u}) members.get(member);
   EXPECT_EQ(members.count(), 3u);
-  // 1 was not used for the longest time.
+  // Member 1, the least recently used, was dropped.
   members.get(0);
   members.get(2);
   members.get(3);

@@ -191,7 +191,7 @@ TEST(FieldLevel, BeginsWithMoreHalvingsOfFinerNodesNotOfAWiderRange) {
   EXPECT_EQ(halvings_to_usual_nodes(square_slabs(384, 281.0)), 1);
   EXPECT_EQ(halvings_to_usual_nodes(square_slabs(384, 410.0)), 0);
   EXPECT_EQ(halvings_to_usual_nodes(square_slabs(768, 410.0)), 1);
-  // Nor do small objects, whose nodes stand close, begin with more halvings.
+  // Small objects, whose nodes stand close, do not begin with more halvings either.
   EXPECT_EQ(halvings_to_usual_nodes(square_slabs(256, 60.0)), 0);
 }
 
@@ -209,8 +209,8 @@ TEST(FieldLevel, SamplesDoNotDependOnVectorWidth) {
   force_vector_width(std::nullopt);
 }
 
-/// Of a field of odd numbers of nodes and slabs, so that levels halve and merge, with and without a
-/// filter: viewpoints asked for one by one, backwards, on the coarsest level, make what they need.
+/// The field has odd numbers of nodes and slabs, so that levels both halve and merge. Viewpoints of
+/// the coarsest level, asked for one by one and backwards, must make what they need.
 TEST(FieldLevel, SamplesDoNotDependOnWhatIsLookedAtFirst) {
   const auto plain = small_field(noise, 3, 5, 16);
   auto with_filter = std::make_shared<CompressedAttenuationField>(*plain);

@@ -43,9 +43,9 @@ std::shared_ptr<CompressedAttenuationField> filtered(
   return field;
 }
 
-/// Fields whose rows of tiles are shorter and longer than a vector, cropped and whole, of odd and
-/// even numbers of nodes, of other numbers along u than along v and one tile along either, plain
-/// and with means.
+/// Fields plain and mean-removed, cropped and whole, with odd and even numbers of nodes. Their rows
+/// of tiles are shorter or longer than a vector. Numbers along u and v differ, down to one tile
+/// along either.
 std::vector<std::shared_ptr<CompressedAttenuationField>> fields() {
   auto cropped = small_field(holed_noise, 1, 4, 13);
   crop_stored(*cropped, {2, 8}, {4, 9});
@@ -118,7 +118,8 @@ TEST(FilteredDecoding, HasTheSameBitsOnEveryVectorWidth) {
   }
 }
 
-/// Of a hostile file: any bits, but the same on every vector width, and no trap.
+/// A hostile file may hold such weights. The result may be anything, but must not trap and must not
+/// depend on the vector width.
 TEST(FilteredDecoding, TakesTheLargestWeights) {
   TileFilter filter = any_filter();
   HashRandom random(8);
@@ -141,7 +142,7 @@ TEST(FilteredDecoding, TakesTheLargestWeights) {
 
 TEST(FilteredDecoding, LeavesWhatIsConstantAsItIs) {
   TileFilter filter = any_filter();
-  // Differences know nothing of a constant; of sums the tile's own is taken off.
+  // A constant has no differences. Its sums are not 0, so the tile's own weight must cancel them.
   float own = 0.0f;
   for (std::size_t a = 0; a < 4; ++a) {
     own -= 2.0f * filter.weights[0][axis_input(a)];
@@ -159,7 +160,7 @@ TEST(FilteredDecoding, LeavesWhatIsConstantAsItIs) {
   });
 }
 
-/// A filter does not know left from right: along every axis.
+/// A filter treats both directions of every axis alike.
 TEST(FilteredDecoding, MirrorsWithTheField) {
   constexpr int kUv = 4;
   constexpr int kSt = 8;
@@ -210,7 +211,7 @@ TEST(FilteredDecoding, IsWhatEveryWayOfLookingUpSees) {
   const Image2d literal = render_image(*make_field_renderer(field, "quadrilinear"), pose, view);
   const Image2d without =
       render_image(*make_field_renderer(FieldPointer(unfiltered), "quadrilinear"), pose, view);
-  // Two passes are not quite the literal sum, which the weights have made rough.
+  // Two passes only approximate the literal sum, which these weights make rough.
   double largest_change = 0.0;
   double largest_difference = 0.0;
   const auto raise_to = [](double& largest, float a, float b) {
@@ -224,8 +225,7 @@ TEST(FilteredDecoding, IsWhatEveryWayOfLookingUpSees) {
   EXPECT_LT(largest_difference, 0.1 * largest_change);
 }
 
-/// Of one slab, a pyramid begins at level 1, which is made without level 0 where there is no
-/// filter.
+/// With one slab, a pyramid begins at level 1. Without a filter, it never makes level 0.
 TEST(FilteredDecoding, IsWhatPyramidsAreMadeOf) {
   const auto field = filtered(small_field(waves, 1, 4, 12), any_filter());
   const FieldLevels from_field = make_field_pyramid(field, 2);

@@ -40,7 +40,7 @@ Drr rendered(const TwoPassAfDrr& renderer,
   return drr;
 }
 
-/// A pose beside one of the small fields' by `share` of a small motion along all six parameters.
+/// One of the small fields' poses, moved by `share` of a small motion along all six parameters.
 RigidTransform beside(double share) {
   PoseParameters parameters = small_pose(8);
   parameters.rotation_rad += share * Eigen::Vector3d(0.002, -0.0015, 0.001);
@@ -65,14 +65,14 @@ TEST(KeptImages, AreNearTheLookUpWhileTheSourceIsNear) {
       const TwoPassAfDrr renderer(small_field(waves, 2, 7, 51), options);
       const auto exact = renderer.make_workspace();
       const Drr at_first = rendered(renderer, beside(0.0), *exact, true);
-      // Of the second order: half the way leaves a quarter of the error, or less than a third where
-      // rounding and the kinks of the nodes' interpolation add to it.
+      // The error is of second order: half the way leaves a quarter of it. Rounding and the kinks
+      // of the nodes' interpolation raise that, but not to a third.
       std::array<double, 2> errors{};
       for (std::size_t i = 0; i < errors.size(); ++i) {
         const RigidTransform pose = beside(i == 0 ? 1.0 : 0.5);
         const auto workspace = renderer.make_workspace();
         workspace->reuse_images(true);
-        // A larger image counts its nodes from elsewhere: rounding.
+        // A larger image counts its nodes from another origin, so it rounds differently.
         const Drr first = rendered(renderer, beside(0.0), *workspace, true);
         EXPECT_LT(distance(first.values, at_first.values), 1e-5 * length(at_first.values));
         EXPECT_LT(distance(first.planes, at_first.planes), 1e-4 * length(at_first.planes));
@@ -100,7 +100,7 @@ TEST(KeptImages, DoNotServeFarPosesNorAfterTheyAreForgotten) {
   begin();
   const RigidTransform far = beside(20.0);
   EXPECT_EQ(rendered(renderer, far, *workspace, false), rendered(renderer, far, *exact, false));
-  // The far DRR had no gradients: nothing is kept of it, and its images took the kept ones' place.
+  // The far DRR had no gradients, so nothing of it is kept. Its images overwrote those kept before.
   const RigidTransform near = beside(1.0);
   const Drr there = rendered(renderer, near, *exact, false);
   EXPECT_EQ(rendered(renderer, near, *workspace, false), there);
@@ -116,8 +116,8 @@ TEST(KeptImages, DoNotServeFarPosesNorAfterTheyAreForgotten) {
   EXPECT_EQ(rendered(renderer, near, *workspace, false), there);
 }
 
-/// How many nodes a slab shifts by, at most, against the plane of the slabs' sum, midway between
-/// the outermost, when the source moves from one pose's place to another's.
+/// By how many nodes, at most, a slab shifts against the plane of the slabs' sum when the source
+/// moves from one pose's place to another's. That plane lies midway between the outermost slabs.
 double parallax_nodes(const LightSlab& field,
                       const RigidTransform& from,
                       const RigidTransform& to) {
@@ -144,7 +144,7 @@ TEST(KeptImages, ServeNoPoseThatShiftsASlabByMoreThanAnEighthOfANode) {
     rendered(renderer, RigidTransform::Identity(), *workspace, true);
     return rendered(renderer, pose, *workspace, false) != rendered(renderer, pose, *exact, false);
   };
-  // About the middle of the plane, so that corners hardly move on it.
+  // A turn about the middle of the plane hardly moves corners on it.
   const auto turned = [](double degrees) {
     PoseParameters parameters;
     parameters.rotation_rad = {0.0, 0.0, degrees * kRadPerDeg};

@@ -76,7 +76,8 @@ TEST(LevelSamples, ATileThatCouldNotBeMadeIsTriedAgain) {
   EXPECT_EQ(samples.viewpoints(0, 0)[0], 1);
 }
 
-/// The child's copy of the memory says that a thread of its parent, which it has not, makes a tile.
+/// In the child's copy of the memory a parent's thread is making a tile, but the child lacks that
+/// thread.
 TEST(LevelSamples, AForkedProcessGoesOnWithWhatItsParentWasMaking) {
   std::atomic<bool> is_making = false;
   std::atomic<bool> may_end = false;

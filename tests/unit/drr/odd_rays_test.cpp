@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Poses and cameras that nobody means, in every way of looking up and in ray casting.
+// Absurd poses and cameras, in every way of looking up and in ray casting.
 #include <array>
 #include <cmath>
 #include <limits>
@@ -24,14 +24,14 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-/// A renderer and the planes that limit its rays; none of ray casting.
+/// A renderer and the field whose planes limit its rays; ray casting has none.
 struct NamedRenderer {
   std::string name;
   std::shared_ptr<const DrrRenderer> renderer;
   std::shared_ptr<const CompressedAttenuationField> field;
 };
 
-/// Every way of looking up, of the field and, where it can be, of its decoded samples.
+/// Every way of looking up in the field and, where possible, in its decoded samples.
 std::vector<NamedRenderer> look_ups(const std::shared_ptr<CompressedAttenuationField>& field) {
   std::vector<NamedRenderer> found;
   const auto decoded = std::make_shared<const FieldLevel>(decode_field(field));
@@ -47,8 +47,8 @@ std::vector<NamedRenderer> all_look_ups() {
   std::vector<NamedRenderer> found;
   for (const int slabs : {1, 3}) {
     const auto field = small_field(waves, slabs);
-    for (const auto& of : {field, mean_removed(*field, 2)})
-      for (NamedRenderer& renderer : look_ups(of)) found.push_back(std::move(renderer));
+    for (const auto& each : {field, mean_removed(*field, 2)})
+      for (NamedRenderer& renderer : look_ups(each)) found.push_back(std::move(renderer));
     const std::shared_ptr<const LightSlab> planes(field, &field->light_slab);
     const auto linear = make_field_renderer(field, "linear");
     found.push_back({"set",
@@ -73,19 +73,20 @@ NamedRenderer ray_casting() {
       nullptr};
 }
 
-/// Renders with and without gradients: a ray is outside and 0, or has a finite value.
-void expect_sound(const NamedRenderer& of, const RigidTransform& pose, const View& view) {
-  const auto workspace = of.renderer->make_workspace();
+/// Renders with and without gradients. Values must be finite, and 0 where all rays are outside.
+void expect_sound(const NamedRenderer& named, const RigidTransform& pose, const View& view) {
+  const auto workspace = named.renderer->make_workspace();
   std::vector<float> values(view.pixel_count(), -1.0f);
   std::vector<float> planes(6 * values.size(), -1.0f);
-  const std::int64_t outside = of.renderer->render(pose, view, *workspace, values).rays_outside;
-  EXPECT_EQ(outside, of.renderer->rays_outside(pose, view)) << of.name;
-  for (const float value : values) ASSERT_TRUE(std::isfinite(value)) << of.name;
+  const std::int64_t outside = named.renderer->render(pose, view, *workspace, values).rays_outside;
+  EXPECT_EQ(outside, named.renderer->rays_outside(pose, view)) << named.name;
+  for (const float value : values) ASSERT_TRUE(std::isfinite(value)) << named.name;
   const bool has_any_inside = outside < static_cast<std::int64_t>(values.size());
-  for (const float value : values) ASSERT_TRUE(has_any_inside || value == 0.0f) << of.name;
+  for (const float value : values) ASSERT_TRUE(has_any_inside || value == 0.0f) << named.name;
   const PoseGradients gradients{Eigen::Vector3d::Zero(), planes};
-  EXPECT_EQ(of.renderer->render(pose, view, *workspace, values, gradients).rays_outside, outside);
-  if (const auto* two_pass = dynamic_cast<const TwoPassAfDrr*>(of.renderer.get())) {
+  EXPECT_EQ(named.renderer->render(pose, view, *workspace, values, gradients).rays_outside,
+            outside);
+  if (const auto* two_pass = dynamic_cast<const TwoPassAfDrr*>(named.renderer.get())) {
     const auto columns = std::span(planes).first(values.size());
     const auto rows = std::span(planes).last(values.size());
     EXPECT_EQ(two_pass->render_gradient_images(pose, view, *workspace, columns, rows).rays_outside,
@@ -93,7 +94,7 @@ void expect_sound(const NamedRenderer& of, const RigidTransform& pose, const Vie
   }
 }
 
-/// Numbers that nobody means, among plausible ones.
+/// Absurd numbers among plausible ones.
 double odd_number(HashRandom& random) {
   constexpr std::array kOdd = {
       kNan, kInfinity, -kInfinity, 1e300, -1e300, 1e30, -1e12, 1e7, 1e-300, -1e-12, 0.0, 45.0};
@@ -159,19 +160,19 @@ CameraGeometry camera_at(const LightSlab& planes, double source_y_mm) {
 
 TEST(OddRays, OfASourceBehindOrWithinTheAttenuationAreOutside) {
   const RigidTransform pose = RigidTransform::Identity();
-  for (NamedRenderer& of : all_look_ups()) {
-    const LightSlab& planes = of.field->light_slab;
+  for (NamedRenderer& named : all_look_ups()) {
+    const LightSlab& planes = named.field->light_slab;
     std::vector<double> heights = {planes.attenuation_end_y_mm, 0.5, -1.0, -200.0};
     for (const SlabGeometry& slab : planes.slabs) heights.push_back(slab.st_plane_y_mm);
     for (const double y_mm : heights) {
       // A small region about the beam, whose lines all lie within the planes.
       const View view{camera_at(planes, y_mm), {14, 11, 3, 3}};
-      EXPECT_EQ(of.renderer->rays_outside(pose, view), 9) << of.name << ' ' << y_mm;
+      EXPECT_EQ(named.renderer->rays_outside(pose, view), 9) << named.name << ' ' << y_mm;
       EXPECT_FALSE(SlabRays(planes, pose, view).all_cross());
-      expect_sound(of, pose, view);
+      expect_sound(named, pose, view);
     }
     const View before{camera_at(planes, planes.attenuation_end_y_mm + 1.0), {14, 11, 3, 3}};
-    EXPECT_EQ(of.renderer->rays_outside(pose, before), 0) << of.name;
+    EXPECT_EQ(named.renderer->rays_outside(pose, before), 0) << named.name;
   }
 }
 

@@ -114,13 +114,13 @@ TEST(PolychromaticAttenuation, HasTheSameBitsAtEveryVectorWidthAndWithSlopes) {
   std::vector<std::vector<float>> slopes;
   for (const VectorWidth width : supported_vector_widths()) {
     force_vector_width(width);
-    Rays of = rays;
-    attenuation.apply(of.all, of.bone, of.all_slopes, of.bone_slopes);
-    values.push_back(of.all);
-    slopes.push_back(of.all_slopes);
-    of = rays;
-    attenuation.apply(of.all, of.bone);
-    values.push_back(of.all);
+    Rays applied = rays;
+    attenuation.apply(applied.all, applied.bone, applied.all_slopes, applied.bone_slopes);
+    values.push_back(applied.all);
+    slopes.push_back(applied.all_slopes);
+    applied = rays;
+    attenuation.apply(applied.all, applied.bone);
+    values.push_back(applied.all);
     // A ray's bits do not depend on its neighbours.
     for (std::size_t i = 0; i < rays.all.size(); ++i)
       ASSERT_EQ(attenuation.at(static_cast<double>(rays.all[i]), static_cast<double>(rays.bone[i]))
@@ -135,13 +135,13 @@ TEST(PolychromaticAttenuation, HasTheSameBitsAtEveryVectorWidthAndWithSlopes) {
 TEST(PolychromaticAttenuation, AppliesTheChainRule) {
   const PolychromaticAttenuation attenuation(SpectrumOptions{}, usual_tissue());
   const Rays rays(77);
-  Rays of = rays;
-  attenuation.apply(of.all, of.bone, of.all_slopes, of.bone_slopes);
-  for (std::size_t i = 0; i < of.all_slopes.size(); ++i) {
+  Rays applied = rays;
+  attenuation.apply(applied.all, applied.bone, applied.all_slopes, applied.bone_slopes);
+  for (std::size_t i = 0; i < applied.all_slopes.size(); ++i) {
     const std::size_t ray = i % rays.all.size();
     const auto value =
         attenuation.at(static_cast<double>(rays.all[ray]), static_cast<double>(rays.bone[ray]));
-    EXPECT_FLOAT_EQ(of.all_slopes[i],
+    EXPECT_FLOAT_EQ(applied.all_slopes[i],
                     static_cast<float>(value.by_all) * rays.all_slopes[i] +
                         static_cast<float>(value.by_bone) * rays.bone_slopes[i]);
   }

@@ -67,7 +67,7 @@ TEST(PolychromaticDrr, OfASlabIsTheSumOverTheSpectrum) {
     const TissueModel tissue{AttenuationModel{}};
     const double share =
         static_cast<double>(tissue.bone_part(static_cast<std::uint16_t>(1000 + hu))) / (1000 + hu);
-    // By the ray's own path through the box: its chord is that of a DRR at one energy.
+    // A DRR at one energy gives the chord of this ray through the box.
     const float chord =
         render_image(RayCastDrr(volume), RigidTransform::Identity(), view).pixels.front() /
         static_cast<float>(slab_attenuation(hu, 0.0, tissue.effective_energy_kev()));
@@ -99,7 +99,7 @@ TEST(PolychromaticDrr, GradientsAgreeWithCentralDifferences) {
   const PolychromaticDrr renderer = cast_through(body(), SpectrumOptions{70.0, 2.5});
   const View view{small_camera(), {3, 2, 20, 15}};
   const RigidTransform pose = pose_from_parameters({}, small_pose(6));
-  // As those of ray casting: differences cross kinks of the interpolant.
+  // As in ray casting, differences cross kinks of the interpolant.
   EXPECT_THAT(test::gradient_distances(renderer, pose, view, {10.0, -20.0, 30.0}),
               testing::Each(testing::Lt(0.01)));
 }
@@ -114,7 +114,7 @@ TEST(PolychromaticDrr, OfTwoFieldsHasTheGradientsOfItsValues) {
                                   attenuation_of({70.0, 2.5}));
   const View view{small_camera(), {3, 2, 20, 15}};
   const RigidTransform pose = pose_from_parameters({}, small_pose(4));
-  // Multilinear fields leave the differences' rounding alone.
+  // In multilinear fields only the differences' rounding is left.
   EXPECT_THAT(test::gradient_distances(renderer, pose, view, {5.0, 3.0, -8.0}),
               testing::Each(testing::Lt(0.01)));
 }

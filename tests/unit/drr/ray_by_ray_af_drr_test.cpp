@@ -138,7 +138,7 @@ TEST(RayByRayAfDrr, GradientsAgreeWithCentralDifferences) {
   }
 }
 
-/// Without u-s and v-t products a ray's value stays bilinear between (s,t) nodes, and both look-ups
+/// Without u-s and v-t products a ray's value stays bilinear between (s,t) nodes, so both look-ups
 /// must agree.
 double without_cross_terms(const RayNodes& n) {
   return 40 + 3 * n.u + 5 * n.v + 7 * n.s + 2 * n.t + n.s * n.t + 2 * n.u * n.v + n.u * n.t +

@@ -116,9 +116,10 @@ TEST(RecalibratedCamera, IsLookedUpInTheOldFieldAsWellAsInItsOwn) {
   double variance = 0.0;
   for (const double gain : gains)
     variance += (gain - mean) * (gain - mean) / (kRecalibratedPoses - 1);
-  // Both lattices have the same nodes on planes of nearly the same size: errors of linear
+  // Both lattices have the same nodes on planes of nearly the same size. Errors of linear
   // interpolation go with the square of the spacing, whose ratio is that of the planes' sides. What
-  // a pose gains beyond that is chance, where its rays fall between the nodes: two standard errors.
+  // a pose gains beyond that is chance: where its rays fall between the nodes. Two standard errors
+  // bound it.
   const auto spacing = [](const FieldLevel& level) {
     return level.field_geometry.slabs[0].s.spacing_mm() *
            level.field_geometry.slabs[0].t.spacing_mm();
@@ -175,7 +176,8 @@ TEST_F(FieldSetDrrTest, LooksUpInTheFieldThatHoldsThePoseBest) {
     EXPECT_EQ(render_image(fields, pose, view).pixels,
               render_image(TwoPassAfDrr(levels[own]), pose, view).pixels);
   }
-  // Nor are both looked up where another axis comes nearer to the planes' edges than the angle.
+  // One field still serves alone where another axis comes nearer to the planes' edges than the
+  // angle does.
   PoseParameters tilted;
   tilted.rotation_rad.x() = 8.0 * kRadPerDeg;
   EXPECT_EQ(fields.weights(pose_from_parameters({}, tilted),
@@ -191,10 +193,10 @@ TEST_F(FieldSetDrrTest, HasNoJumpAtASeam) {
   const FieldSetDrr fields = set();
   const RayCastDrr reference(volume);
   const RigidTransform pose = pose_from_parameters({}, {});
-  // Steps as an optimiser's last ones. A weight falls from 1 to 0 while the logarithms of how far
-  // rays keep from the edges come to differ by kSeam = 0.4; they differ by some 0.3 per degree. It
-  // changes by far less than 0.2 per step, and so does the DRR, by that part of the difference of
-  // two fields.
+  // Steps like an optimiser's last ones. A weight falls from 1 to 0 while the logarithms of the
+  // rays' distances from the edges come to differ by kSeam = 0.4. They differ by some 0.3 per
+  // degree, so a weight changes by far less than 0.2 per step. The DRR changes by that part of the
+  // difference of two fields.
   constexpr double kStepDeg = 0.05;
   constexpr double kLargestWeightStep = 0.2;
   constexpr double kLargestJumpDb = 0.5;

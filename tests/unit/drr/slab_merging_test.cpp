@@ -63,9 +63,9 @@ TEST(SlabMerging, PlaneLiesAtTheCentroidOfAttenuation) {
   EXPECT_NEAR(MergedSlab(level).geometry.st_plane_y_mm, 0.25 * near_y + 0.75 * far_y, 1e-3);
 }
 
-/// What is seen through a slab's plane as a function of the position there is seen at the same
-/// position from every viewpoint, wherever the merged plane lies. A cubic is met exactly by the
-/// taps' interpolation; their blur adds its second derivative times half their variance.
+/// Here each slab shows a function of the position on its plane. Every viewpoint must see it at
+/// that position, wherever the merged plane lies. The taps interpolate a cubic exactly; their blur
+/// adds its second derivative times half their variance.
 TEST(SlabMerging, SeesEachSlabWhereItIsFromEveryViewpoint) {
   constexpr int kNodes = 32;
   const auto bump = [](double s, double t) {

@@ -11,19 +11,21 @@ namespace {
 
 constexpr int kPadding = 64;
 
-/// An image of a function of the place on the plane, and its memory.
+/// The image of a function of the place on a plane, with its memory.
 struct Picture {
   NodeGrid grid;
   std::vector<float> values;
 
-  Picture(const NodeGrid& of, const std::function<double(double, double)>& function)
-      : grid(of), values(static_cast<std::size_t>(of.stride * (of.t_count + 4) + kPadding)) {
+  Picture(const NodeGrid& nodes, const std::function<double(double, double)>& function)
+      : grid(nodes),
+        values(static_cast<std::size_t>(nodes.stride * (nodes.t_count + 4) + kPadding)) {
     for (int t = 0; t < grid.t_count; ++t)
       for (int s = 0; s < grid.s_count; ++s)
         values[static_cast<std::size_t>(t * grid.stride + s)] = static_cast<float>(function(
             grid.s_first_mm + s * grid.s_spacing_mm, grid.t_first_mm + t * grid.t_spacing_mm));
   }
-  explicit Picture(const NodeGrid& of) : Picture(of, [](double, double) { return std::nan(""); }) {}
+  explicit Picture(const NodeGrid& nodes)
+      : Picture(nodes, [](double, double) { return std::nan(""); }) {}
 };
 
 NodeGrid grid_at(double plane_y_mm, double scale) {
@@ -50,8 +52,8 @@ TEST(SlabSum, OfOneSlabInItsOwnPlaneIsTheSlab) {
     }
 }
 
-/// What two slabs show along the ray through each node of a plane between them; and how it changes
-/// as the source moves while the node stays, by differences of the same definition.
+/// What two slabs show along the ray through each node of a plane between them. Differences of it
+/// say how it changes as the source moves while the node stays.
 TEST(SlabSum, ShowsWhatTheSlabsShowAndHowItMovesWithTheSource) {
   const std::array<double, 2> planes{-30.0, 45.0};
   const NodeGrid sum_grid{-15.0, 0.5, -10.0, 0.4, 5.0, 64, 61, 51};

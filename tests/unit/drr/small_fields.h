@@ -25,22 +25,22 @@ std::shared_ptr<CompressedAttenuationField> small_field(const FieldFunction& fun
                                                         int uv_nodes = 5,
                                                         int st_nodes = 9);
 
-/// The same field of mean-removed tiles. Nothing is lost where no level differs from its tile's
+/// The same field with mean-removed tiles. Nothing is lost where no level differs from its tile's
 /// mean by 32767 or more.
 std::shared_ptr<CompressedAttenuationField> mean_removed(const CompressedAttenuationField& field,
                                                          int mean_step);
 
-/// Leaves of a one-slab field that stores its whole lattice the even-aligned nodes s x t.
+/// Crops a one-slab field, which stores its whole lattice, to the even-aligned nodes s x t.
 void crop_stored(CompressedAttenuationField& field, const NodeRange& s, const NodeRange& t);
 
-/// Leaves of a one-slab field of plain tiles its first viewpoints along u and v, even numbers or
-/// all.
+/// Crops a one-slab field of plain tiles to its first viewpoints along u and v. Each number is
+/// even, or all there are.
 void crop_viewpoints(CompressedAttenuationField& field, int u_nodes, int v_nodes);
 
 /// Pose `index` of a fixed random series within the small fields' range.
 PoseParameters small_pose(std::uint64_t index);
 
-/// A pose that some of small_camera()'s rays, not all, miss the small fields at.
+/// A pose at which some, but not all, of small_camera()'s rays miss the small fields.
 RigidTransform pose_partly_outside();
 
 }  // namespace af

@@ -109,7 +109,7 @@ TEST(TwoPassAfDrr, MeanRemovedTilesGiveTheBitsOfPlainOnes) {
     }
 }
 
-/// One tile everywhere, whose levels go beyond both ends.
+/// The same tile everywhere, whose levels go beyond both ends.
 TEST(TwoPassAfDrr, LevelsOfMeanRemovedTilesAreLimited) {
   for (const int mean : {96, 65520}) {
     const auto field = small_field(waves, 1, 6, 24);

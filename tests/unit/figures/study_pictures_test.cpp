@@ -102,7 +102,7 @@ TEST(LayingTelltale, NamesHowThePictureWouldFit) {
   const Image2d drr = uneven_picture(96);
   EXPECT_THAT(laying_telltale(laying_matches(shifted(mirrored(drr), 6, 4), drr)),
               HasSubstr("when flipped left to right"));
-  // Turned clockwise, it fits after a turn the other way.
+  // A picture turned clockwise fits after a turn the other way.
   EXPECT_THAT(laying_telltale(laying_matches(turned_clockwise(drr), drr)),
               HasSubstr("when turned by 90 degrees anticlockwise"));
   EXPECT_THAT(laying_telltale(laying_matches(turned_clockwise(turned_clockwise(drr)), drr)),
@@ -117,7 +117,8 @@ TEST(LayingTelltale, IsSilentForNoiseAndForConstantPictures) {
   EXPECT_EQ(laying_telltale(laying_matches(Image2d(64, 64), uneven_picture(64))), "");
 }
 
-/// The picture about its middle, as a detector of other pixels sees it: nearest neighbours.
+/// The picture scaled about its middle, as a detector with other pixels sees it. Takes nearest
+/// neighbours.
 Image2d scaled(const Image2d& image, double factor) {
   Image2d result(image.width, image.height);
   const auto source = [&](int at, int count) {
@@ -168,7 +169,7 @@ TEST(RoomSketch, ShowsEveryCameraWithinItsPaper) {
   }
 }
 
-/// DRRs of one value, which keeps the views that it was asked for.
+/// Renders DRRs of one value.
 class FlatDrr final : public DrrRenderer {
  public:
   explicit FlatDrr(float value) : value_(value) {}
@@ -196,9 +197,9 @@ TEST(StudyPictures, ShowTheDrrsOfTheRendererThatIsNamedForAView) {
   const CameraGeometry& camera = study.rig.camera("AP");
   const Image2d xray = uneven_picture(camera.size_px.x());
   write_image(xray, folder / "xray.mha", camera.pixel_spacing_mm.x(), camera.pixel_spacing_mm.y());
-  StudyCase& of = study.cases.emplace_back();
-  of.name = "one";
-  StudyView& view = of.views.emplace_back();
+  StudyCase& only = study.cases.emplace_back();
+  only.name = "one";
+  StudyView& view = only.views.emplace_back();
   view.camera = "AP";
   view.xray = folder / "xray.mha";
   view.xray_domain = XrayDomain::Attenuation;
@@ -212,7 +213,7 @@ TEST(StudyPictures, ShowTheDrrsOfTheRendererThatIsNamedForAView) {
       return std::make_shared<const FlatDrr>(value);
     };
     const StudyPictures drawn =
-        draw_study_pictures(study, of, ct, renderer_of, 128, folder.path(), "one");
+        draw_study_pictures(study, only, ct, renderer_of, 128, folder.path(), "one");
     EXPECT_EQ(widths, std::vector<int>{camera.size_px.x() / 2}) << "the nominal pose, shrunk";
     EXPECT_EQ(drawn.problems.size(), value > 0.0F ? 0U : 1U) << "a DRR without matter";
     EXPECT_EQ(drawn.files.size(), 2U);
@@ -221,7 +222,7 @@ TEST(StudyPictures, ShowTheDrrsOfTheRendererThatIsNamedForAView) {
   }
 }
 
-/// The middle of the brightest pixels of a panel; its coordinates stand on white.
+/// The middle of a panel's brightest pixels. White, which carries the coordinates, does not count.
 std::array<double, 2> brightest_place(const PicturePanel& panel) {
   float highest = -1e9F;
   for (const float value : panel.image.pixels)
@@ -234,9 +235,9 @@ std::array<double, 2> brightest_place(const PicturePanel& panel) {
   return {sums[0] / sums[2], sums[1] / sums[2]};
 }
 
-// Axial from the feet, coronal from the front, sagittal from the patient's left: what lies left, at
-// the back and towards the head is at the right, below and on top. A marked point lies on what the
-// CT has there, whatever the order of its voxels.
+// Axial is seen from the feet, coronal from the front, sagittal from the patient's left. So left is
+// at the right, the back is below, and the head is on top. A marked point lies on what the CT has
+// there, whatever the order of its voxels.
 TEST(CtOverview, ShowsPointsOfTheCtWhereRadiographersExpectThem) {
   const Vector3d point(30.0, 20.0, 10.0);
   for (const Vector3d& signs : {Vector3d(1, 1, 1), Vector3d(-1, -1, 1), Vector3d(1, -1, -1)}) {

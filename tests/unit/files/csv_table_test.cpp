@@ -155,7 +155,7 @@ TEST_F(CsvTableFile, WrittenInPartsIsTheSameFile) {
 }
 
 TEST_F(CsvTableFile, IsReadInPartsLikeAsAWhole) {
-  // Files are read 64 KiB at a time: a first row one byte longer each time moves that seam over all
+  // Files are read 64 KiB at a time. A first row that grows by one byte moves that seam over all
   // that a row has.
   const std::string rows = "plain,\"quoted\",\"a \"\"b\"\", c\"\r\n1,\"two\r\nlines\",\r\r\n";
   for (std::size_t shift = 0; shift < rows.size(); ++shift) {

@@ -95,7 +95,7 @@ TEST(OutputFile, NothingButAFileIsReplaced) {
   fs::create_directory(folder / "folder");
   fs::create_symlink(folder / "pipe", folder / "link");
   fs::create_symlink(folder / "nowhere", folder / "dangling");
-  // May need root; a pipe stands for it elsewhere.
+  // Making a device may need root; elsewhere a pipe stands in for it.
   const bool has_device = mknod((folder / "device").c_str(), S_IFCHR | 0600, makedev(1, 3)) == 0;
   for (const char* name : {"pipe", "folder", "link", "dangling", "device"}) {
     if (!has_device && std::string(name) == "device") continue;

@@ -36,7 +36,7 @@ std::string refusal(const std::filesystem::path& output) {
   }
 }
 
-/// What taking the lock says where something else than a lock file is in its place.
+/// What taking the lock says where something other than a lock file is in its place.
 std::string failure(const std::filesystem::path& output) {
   try {
     const OutputLock lock(output);
@@ -46,7 +46,7 @@ std::string failure(const std::filesystem::path& output) {
   }
 }
 
-/// A process of its own that does something and does not come back from it.
+/// A child process that does some work. Only the destructor reaps it.
 class Child {
  public:
   explicit Child(const std::function<void()>& work) : process_(fork()) {
@@ -173,7 +173,7 @@ TEST(OutputLock, OfAFolderServesWhatStandsWithinAndItsUnfinishedWork) {
   EXPECT_TRUE(std::filesystem::exists(folder / "results.old" / "a.csv.lock"));
 }
 
-// As two programs that begin at the same time: the second ends before it reads anything.
+// Of two programs that begin at the same time, the second ends before it reads anything.
 TEST(OutputLock, OfAnAnnouncedFileIsHeldUntilItIsWritten) {
   const test::ScratchFolder folder;
   announce_output(folder / "a.txt");

@@ -112,7 +112,7 @@ TEST(UserCache, IsWholeWhenProcessesWriteItAtOnce) {
   for (pid_t& writer : writers) {
     writer = fork();
     if (writer != 0) continue;
-    // What is found is of one of them, or the first: numbers that are all alike.
+    // Whatever a read finds, one writer wrote it whole, so its numbers are all alike.
     const Numbers own(kNumbers, static_cast<double>(getpid()));
     for (int i = 0; i < kWrites; ++i) {
       keep_in_cache(kKey, own);

@@ -171,7 +171,7 @@ TEST(FiducialGold, IsMadeFromThoseThatTwoViewsShow) {
 
 TEST(FiducialGold, OfAHiddenFiducialEqualsThatOfAStudyWithoutIt) {
   SeenFiducials seen;
-  // Noise, so that the fit is no exact one.
+  // Noise keeps the fit from being exact.
   HashRandom random(3, 1);
   for (FiducialView& view : seen.views)
     for (Eigen::Vector2d& point : view.fiducials_px)

@@ -58,7 +58,7 @@ TEST(LeaveOneOut, OfHandComputedCases) {
   ASSERT_EQ(errors_mm.size(), 4u);
   // Double rounding of coordinates of 10 mm through an SVD.
   EXPECT_NEAR(errors_mm[3], 5.0, 1e-12);
-  // Each prediction from a set with the moved point is off, too, and the fit hides none of it:
+  // Predictions from sets with the moved point are off, too, and no fit hides that. So
   // leave-one-out errors exceed the residuals of the fit to all.
   const RigidFit fit = fit_rigid(target, source);
   for (std::size_t i = 0; i < 4; ++i) EXPECT_GT(errors_mm[i], fit.residuals_mm[i]) << i;
@@ -94,7 +94,7 @@ TEST(GoldUncertainty, CountsOnlyWhatViewsShow) {
   EXPECT_EQ(uncertainty_of(views, 1, 5).degrees_of_freedom, 2u * 3u * 4u - 6u);
   views[2].fiducials_px[0] = hidden_fiducial_px();
   EXPECT_EQ(uncertainty_of(views, 1, 5).degrees_of_freedom, 2u * (3u * 4u - 1u) - 6u);
-  // Fiducial 1 is left in one view: its detection there says nothing either.
+  // Fiducial 1 is left in one view only, so its detection there says nothing either.
   views[0].fiducials_px[1] = views[1].fiducials_px[1] = hidden_fiducial_px();
   const GoldUncertainty result = uncertainty_of(views, 1, 20);
   EXPECT_EQ(result.degrees_of_freedom, 2u * (3u * 3u - 1u) - 6u);
@@ -114,8 +114,9 @@ TEST(GoldUncertainty, GrowsInProportionToTheResiduals) {
   std::vector<FiducialView> far = noisy_views(0.2, 4);
   const GoldUncertainty small = uncertainty_of(near, 1, 50);
   const GoldUncertainty large = uncertainty_of(far, 1, 50);
-  // Everything is linear in errors of 0.2 px (0.04 degrees over fiducials 25 mm from their centre)
-  // up to their square, 1e-3 of them, and what the pose they are measured at changes.
+  // Everything is linear in errors of 0.2 px, which are 0.04 degrees over fiducials 25 mm from
+  // their centre. Only their square, 1e-3 of them, and the changed pose that they are measured at
+  // are not.
   constexpr double kNonlinearShare = 0.01;
   EXPECT_NEAR(large.detection_sigma_px / small.detection_sigma_px, 2.0, 2 * kNonlinearShare);
   EXPECT_NEAR(large.rms_tre_mm / small.rms_tre_mm, 2.0, 2 * kNonlinearShare);

@@ -28,7 +28,7 @@ std::vector<CameraGeometry> two_cameras() {
           camera_at("B", {650, 0, 0}, Vector3d::UnitY())};
 }
 
-/// What cameras see at a pose; `count` landmarks of each.
+/// What cameras see at a pose: the first `count` landmarks each.
 std::vector<LandmarkView> seen(const std::vector<CameraGeometry>& cameras,
                                const RigidTransform& pose,
                                std::size_t count) {
@@ -43,7 +43,7 @@ std::vector<LandmarkView> seen(const std::vector<CameraGeometry>& cameras,
   return views;
 }
 
-/// Far from nominal: every rotation is one that a wrong guess may have.
+/// Far from nominal, with rotations that a wrong guess may have.
 RigidTransform far_pose(int index) {
   const std::array<std::array<double, 6>, 5> values = {{{170, -60, 95, 8, -12, 20},
                                                         {-90, 0, 180, 0, 0, 0},

@@ -24,8 +24,8 @@ CameraGeometry camera_with(const LensDistortion& lens) {
   return camera;
 }
 
-// cv2.projectPoints of OpenCV 4.6 puts what an undistorted image shows at these pixels there; ten
-// digits were kept.
+// The oracle is cv2.projectPoints of OpenCV 4.6, which maps pixels of the undistorted image to
+// stored ones. Ten decimals were kept.
 TEST(LensDistortion, IsOpenCvs) {
   constexpr double kKeptPx = 1e-9;
   const PixelDistortion five(camera_with(kFive));
@@ -90,7 +90,7 @@ TEST(LensDistortion, FoldedImagesAreRefused) {
   EXPECT_EQ(distortion_problem(camera_with(kFive)), "");
   EXPECT_THAT(distortion_problem(camera_with({{-5.0}})), testing::HasSubstr("must not fold"));
   EXPECT_THAT(distortion_problem(camera_with({{-1e5}})), testing::HasSubstr("must not fold"))
-      << "both directions are turned over beyond a fold that is narrower than a step";
+      << "the fold is narrower than a step, and beyond it both directions are reversed";
   LensDistortion pole;
   pole.coefficients[5] = -20.0;  // the denominator is 0 within the image
   EXPECT_THAT(distortion_problem(camera_with(pole)), testing::HasSubstr("must not fold"));

@@ -58,7 +58,7 @@ bool all_rays_inside(const LightSlab& planes,
   return true;
 }
 
-/// Poses of a box: its corners first, then its faces and its inside.
+/// Poses of a box: its corners first, then its faces and its interior.
 PoseParameters sampled(const MotionRange& range, int index, HashRandom& random) {
   std::array<double, 6> share{};
   for (std::size_t p = 0; p < 6; ++p) {
@@ -124,8 +124,8 @@ TEST(RayCoverage, SaysWhatSampledRaysSay) {
     HashRandom random(3);
     for (int i = 0; i < 2000; ++i)
       ASSERT_TRUE(all_rays_inside(planes, camera, {}, sampled(box, i, random))) << "pose " << i;
-    // Of a box 5 % larger a corner's or a face's rays miss: extremes lie near corners at angles so
-    // small.
+    // In a box 5 % larger, rays of some corner or face miss. At angles this small, extremes lie
+    // near corners.
     bool is_any_outside = false;
     for (int i = 0; i < 2000 && !is_any_outside; ++i)
       is_any_outside = !all_rays_inside(planes, camera, {}, sampled(box.scaled(1.05), i, random));
@@ -173,7 +173,7 @@ TEST(MotionRange, SaysWhichPosesItHoldsAndWhatTwoNumbersCanSayOfIt) {
   EXPECT_TRUE(problems(range).empty());
   std::swap(low.rotation_rad.x(), high.rotation_rad.x());
   EXPECT_EQ(problems(MotionRange(low, high)).size(), 1U);
-  // A range beside zero: nothing about zero is covered.
+  // A range that excludes zero covers nothing about zero.
   const MotionRange beside(PoseParameters{Eigen::Vector3d::Constant(0.1), Eigen::Vector3d::Zero()},
                            PoseParameters{Eigen::Vector3d::Constant(0.2), Eigen::Vector3d::Zero()});
   EXPECT_EQ(beside.symmetric_part().max_rotation_rad(), 0.0);
@@ -251,7 +251,7 @@ struct RandomOrbit {
   [[nodiscard]] CameraGeometry at(double angle_rad) const {
     return turned_camera(camera, isocenter_point, orbit.direction(), angle_rad);
   }
-  /// Angles at the ends of the orbit, between members, and any.
+  /// Angles at both ends of the orbit and anywhere between.
   double angle(int index, HashRandom& random) const {
     if (index % 5 == 0) return orbit.from_rad;
     if (index % 5 == 1) return orbit.to_rad;
@@ -259,17 +259,17 @@ struct RandomOrbit {
   }
 };
 
-/// The pose that the camera of a member sees as a camera at `angle_rad` sees this.
+/// The pose that looks to the member's camera as `pose` looks to a camera at `angle_rad`.
 PoseParameters seen_by(const OrbitMember& member,
-                       const RandomOrbit& of,
+                       const RandomOrbit& atlas,
                        double angle_rad,
                        const RigidTransform& pose) {
   const Eigen::Matrix3d back =
-      Eigen::AngleAxisd(member.angle_rad - angle_rad, of.orbit.direction()).toRotationMatrix();
+      Eigen::AngleAxisd(member.angle_rad - angle_rad, atlas.orbit.direction()).toRotationMatrix();
   RigidTransform seen = RigidTransform::Identity();
   seen.linear() = back * pose.linear();
-  seen.translation() = of.isocenter_point + back * (pose.translation() - of.isocenter_point);
-  return parameters_from_pose(of.frame, seen);
+  seen.translation() = atlas.isocenter_point + back * (pose.translation() - atlas.isocenter_point);
+  return parameters_from_pose(atlas.frame, seen);
 }
 
 bool has_source(const OrbitMember& member, const Eigen::Vector3d& source_ct) {
@@ -284,20 +284,21 @@ TEST(Orbit, EveryPoseAtEveryAngleIsAMembers) {
   HashRandom random(43);
   int bounded = 0;
   for (int setting = 0; setting < kSettings; ++setting) {
-    const RandomOrbit of(random);
-    const std::vector<OrbitMember> members = of.members();
+    const RandomOrbit atlas(random);
+    const std::vector<OrbitMember> members = atlas.members();
     bounded += members.front().sources.empty() ? 0 : 1;
     for (int i = 0; i < kPosesEach; ++i) {
-      const double angle = of.angle(i, random);
-      const RigidTransform pose = pose_from_parameters(of.frame, sampled(of.range, i, random));
-      const Eigen::Vector3d source_ct = pose.inverse() * of.at(angle).source_point;
+      const double angle = atlas.angle(i, random);
+      const RigidTransform pose =
+          pose_from_parameters(atlas.frame, sampled(atlas.range, i, random));
+      const Eigen::Vector3d source_ct = pose.inverse() * atlas.at(angle).source_point;
       const bool is_held =
           std::any_of(members.begin(), members.end(), [&](const OrbitMember& member) {
             return has_source(member, source_ct) &&
-                   member.sized_for.contains(seen_by(member, of, angle, pose));
+                   member.sized_for.contains(seen_by(member, atlas, angle, pose));
           });
-      ASSERT_TRUE(is_held) << setting << ", pose " << i << ", " << text_of(of.orbit) << ", angle "
-                           << angle << ", " << of.range.text();
+      ASSERT_TRUE(is_held) << setting << ", pose " << i << ", " << text_of(atlas.orbit)
+                           << ", angle " << angle << ", " << atlas.range.text();
     }
   }
   EXPECT_GT(bounded, kSettings / 5);  // a third of them are about z
@@ -308,24 +309,24 @@ TEST(Orbit, EveryRayAtEveryAngleIsHeldByOneMember) {
   constexpr int kPosesEach = 400;
   HashRandom random(47);
   for (int setting = 0; setting < kSettings; ++setting) {
-    const RandomOrbit of(random);
+    const RandomOrbit atlas(random);
     std::vector<LightSlab> planes;
-    for (const OrbitMember& member : of.members())
-      planes.push_back(planes_of(member.camera, of.frame, member.sized_for, {}, member.sources));
+    for (const OrbitMember& member : atlas.members())
+      planes.push_back(planes_of(member.camera, atlas.frame, member.sized_for, {}, member.sources));
     for (int i = 0; i < kPosesEach; ++i) {
-      const CameraGeometry camera = of.at(of.angle(i, random));
-      const PoseParameters pose = sampled(of.range, i, random);
+      const CameraGeometry camera = atlas.at(atlas.angle(i, random));
+      const PoseParameters pose = sampled(atlas.range, i, random);
       ASSERT_TRUE(std::any_of(planes.begin(),
                               planes.end(),
                               [&](const LightSlab& of_member) {
-                                return all_rays_inside(of_member, camera, of.frame, pose);
+                                return all_rays_inside(of_member, camera, atlas.frame, pose);
                               }))
           << setting << ", " << i;
     }
   }
 }
 
-/// How wide the (u,v) plane is met along u by sampled rays whose source is a member's.
+/// The width along u over which sampled rays from the member's sources meet the (u,v) plane.
 double hit_width(const LightSlab& planes, const OrbitMember& member, HashRandom& random) {
   constexpr int kPoses = 30000;
   double low = 0.0;
@@ -350,7 +351,7 @@ double hit_width(const LightSlab& planes, const OrbitMember& member, HashRandom&
 /// Every member holds its own range whole, without the help of its neighbours, and about the axis
 /// no more than its sources need.
 TEST(Orbit, AMemberHoldsItsRangeOnPlanesAsNarrowAsItsSources) {
-  constexpr double kMostSlack = 1.2;  // bounds are of a dual problem, samples miss the extremes
+  constexpr double kMostSlack = 1.2;  // dual bounds are loose, samples miss the extremes
   HashRandom random(53);
   Orbit orbit;
   orbit.from_rad = -60.0 * kRadPerDeg;
@@ -396,7 +397,7 @@ TEST(Orbit, AboutZMembersTileAnglesOfCamerasAndPoses) {
   EXPECT_GE(of_member.high.translation_mm.x(), 30.0 * (std::cos(farthest) + std::sin(farthest)));
   EXPECT_LE(of_member.high.translation_mm.x(), 30.0 * std::numbers::sqrt2);
   EXPECT_EQ(of_member.high.translation_mm.z(), 30.0);
-  // An orbit beside 0 is cut into equal parts.
+  // An orbit that excludes 0 is cut into equal parts.
   orbit.from_rad = 30.0 * kRadPerDeg;
   const std::vector<OrbitMember> beside =
       orbit_members(test::paper_camera(), {0, 0, 0}, {}, range, orbit);

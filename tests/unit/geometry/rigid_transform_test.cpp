@@ -198,21 +198,22 @@ TEST(RigidFromMatrix, KeepsTheBitsOfAnExactRotation) {
 }
 
 TEST(RotationBetween, TakesOneDirectionToTheOther) {
-  // Also ones that are nearly, or quite, opposite.
+  // Some directions are nearly, or exactly, opposite.
   std::vector<Vector3d> directions = {{1.0, 0.0, 0.0}, {-2.0, 0.0, 0.0}, {0.3, -4.0, 0.2}};
   for (const double aside : {0.0, 1e-8, 3e-6, 1e-4, 0.03, 0.05})
     directions.emplace_back(-0.3 + aside, 4.0, -0.2);
   for (const Vector3d& from : directions)
     for (const Vector3d& to : directions) {
       const Matrix3d rotation = rotation_between(from, to);
-      // Within 1.4e-6 rad of opposite it is half a turn; further away the cosine's rounding by some
-      // 1e-16, against its distance from -1 (above 1e-3; below, the quaternion is normalized).
+      // Within 1.4e-6 rad of opposite it is half a turn. Further away the error is the cosine's
+      // rounding, some 1e-16, against its distance from -1 (above 1e-3; below, the quaternion is
+      // normalized).
       const bool is_half_turn = from.normalized().dot(to.normalized()) < -1.0 + 1e-12;
       EXPECT_LT((rotation * from.normalized() - to.normalized()).norm(),
                 is_half_turn ? 1.5e-6 : 1e-9);
       EXPECT_LT((rotation.transpose() * rotation - Matrix3d::Identity()).norm(), 1e-11);
       EXPECT_GT(rotation.determinant(), 0.0);
-      // By the smallest angle: what is across both stays.
+      // It turns by the smallest angle, so what is across both directions stays.
       if (!is_half_turn) {
         const Vector3d across = from.cross(to);
         EXPECT_LT((rotation * across - across).norm(), 1e-9 * across.norm() + 1e-300);

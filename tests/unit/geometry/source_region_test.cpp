@@ -79,24 +79,24 @@ TEST(SourceRegion, NoRayFromWithinMissesTheNarrowedPlanes) {
   int within = 0;
   int narrower = 0;
   for (int setting = 0; setting < kSettings; ++setting) {
-    const RandomSetting of(random);
+    const RandomSetting drawn(random);
     std::vector<HalfSpace> sources;
     for (int i = 0; i < 1 + setting % 3; ++i) {
-      // Across the sources, towards a pose's; normals need not be unit vectors.
+      // The bound passes through a pose's source. Normals need not be unit vectors.
       const Eigen::Vector3d normal = anywhere(random, 2.0);
-      sources.push_back({normal, normal.dot(of.source_ct(of.pose(random)))});
+      sources.push_back({normal, normal.dot(drawn.source_ct(drawn.pose(random)))});
     }
-    const LightSlab planes = of.planes(sources);
-    const LightSlab of_all = of.planes({});
+    const LightSlab planes = drawn.planes(sources);
+    const LightSlab of_all = drawn.planes({});
     if (planes.u.last_mm - planes.u.first_mm < 0.95 * (of_all.u.last_mm - of_all.u.first_mm))
       ++narrower;
     for (int i = 0; i < kPosesEach; ++i) {
-      const RigidTransform pose = of.pose(random);
-      if (!contains(sources, of.source_ct(pose))) continue;
+      const RigidTransform pose = drawn.pose(random);
+      if (!contains(sources, drawn.source_ct(pose))) continue;
       ++within;
       const RigidTransform slab_from_room = planes.slab_from_ct * pose.inverse();
-      const Eigen::Vector3d source = slab_from_room * of.camera.source_point;
-      for (const Eigen::Vector3d& corner : of.camera.detector_corner_points())
+      const Eigen::Vector3d source = slab_from_room * drawn.camera.source_point;
+      for (const Eigen::Vector3d& corner : drawn.camera.detector_corner_points())
         for (const SlabGeometry& slab : planes.slabs)
           ASSERT_TRUE(planes.intersect({source, slab_from_room * corner - source}, slab))
               << setting << ", " << i;
@@ -106,8 +106,8 @@ TEST(SourceRegion, NoRayFromWithinMissesTheNarrowedPlanes) {
   EXPECT_GT(narrower, kSettings / 4);
 }
 
-/// Without turns all rays to a corner of the detector are parallel, and bounds of the source are
-/// bounds of the hit: closed forms.
+/// Without turns all rays to a corner of the detector are parallel. So bounds of the source are
+/// bounds of the hit, in closed form.
 TEST(SourceRegion, IsExactWhereTheCtOnlyShifts) {
   const MotionRange range{0.0, 30.0};
   const CameraGeometry camera = test::paper_camera();

@@ -96,7 +96,7 @@ TEST(ProgressJournal, GivesEveryRunFilesOfItsOwn) {
   const ProgressJournal second(work_in(folder / "p"));
   EXPECT_EQ(second.run(), 1);
   append(second, "four", 0, second.run());
-  // Runs go by number, not by letters; the first one's process writes on.
+  // Runs sort by number, not as text. The first run's process goes on writing.
   append(second, "far later", 0, 10001);
   append(second, "from the past", 0, 0);
   const ProgressJournal last(work_in(folder / "p"));
@@ -111,7 +111,7 @@ TEST(ProgressJournal, JoinsTheShardsOfAllProcessesAndNoOtherJournals) {
   const ProgressJournal journal(work_in(folder / "p"));
   append(journal, "of twelve", 12);
   append(journal, "of two", 2);
-  // Names that begin alike.
+  // The other name begins alike.
   const ProgressJournal other({folder / "p", "case.2", kDecides});
   append(other, "other", 1);
   EXPECT_THAT(finished(journal), ElementsAre("one", "", "three", "of two", "of twelve"));
@@ -304,7 +304,7 @@ TEST(ProgressJournal, PassesOverWhateverElseHasTheNameOfAShard) {
   fs::create_symlink("nowhere", folder / "p/case.0003-000000.records");
   fs::create_symlink(first.filename(), folder / "p/case.0004-000000.records");
   fs::create_symlink("case.0005-000000.records", folder / "p/case.0005-000000.records");
-  // Runs and ranks that there cannot be.
+  // No such runs or ranks can exist.
   for (const char* name : {"9223372036854775807-000000", "0000-9223372036854775807", "-001-000000"})
     std::ofstream(folder / "p" / ("case." + std::string(name) + ".records")) << "x";
   const ProgressJournal journal(work_in(folder / "p"));

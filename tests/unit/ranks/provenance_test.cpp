@@ -48,7 +48,7 @@ TEST(Provenance, JsonRecordsTheMakingOfAnOutput) {
   const nlohmann::json json = to_json(example());
   EXPECT_EQ(json["program"], "af-register");
   EXPECT_EQ(json["program_version"], program_version());
-  // A test is no program.
+  // A test is not one of the programs, so it has no commit.
   EXPECT_EQ(json["program_commit"], "unknown");
   EXPECT_EQ(json["compiler"], compiler_description());
   EXPECT_EQ(json["command_line"], example().command_line);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Each test is a process of its own: what is asked for cannot be taken back.
+// Each test is a process of its own, because a request cannot be taken back.
 #include "ranks/stop_request.h"
 
 #include <chrono>

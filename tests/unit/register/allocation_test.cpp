@@ -15,7 +15,7 @@
 namespace af::registration {
 namespace {
 
-/// Allocations, of all threads, while `work` runs.
+/// Allocations by all threads while `work` runs.
 template <typename Work>
 long allocations_of(const Work& work) {
   const long before = test::allocation_count();
@@ -23,9 +23,9 @@ long allocations_of(const Work& work) {
   return test::allocation_count() - before;
 }
 
-/// Whether `work` comes to allocate nothing. Which thread takes which part of it is not fixed, on a
-/// busy machine one may sleep through hundreds of repetitions, and each has its first memory to
-/// make; what allocates every time never gets there.
+/// Whether `work` stops allocating after some repetitions. Each thread allocates once, when it
+/// first takes a part, and on a busy machine one may sleep through hundreds of repetitions. Work
+/// that allocates every time never settles.
 template <typename Work>
 bool settles(const Work& work) {
   constexpr int kInARow = 20;

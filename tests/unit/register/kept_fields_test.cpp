@@ -18,7 +18,7 @@ StudyCase case_of(const std::vector<std::string>& fields) {
   return study_case;
 }
 
-/// Stands for an open field: it is counted, and nobody looks into it.
+/// Stands for an open field. The tests count its users and never look into it.
 std::shared_ptr<const OpenedField> some_field() {
   const auto owner = std::make_shared<int>();
   return {owner, reinterpret_cast<const OpenedField*>(owner.get())};

@@ -312,7 +312,7 @@ TEST_F(StudyFile, FiducialsMayBeHiddenInAView) {
     EXPECT_FALSE(again.fiducials_px[2].allFinite()) << hidden;
     EXPECT_EQ(again.fiducials_px[3], view.fiducials_px[3]);
   }
-  // Half a point is none, and the CT's fiducials have all to be there.
+  // Half a point is not a point, and all of the CT's fiducials must be there.
   for (const char* bad : {"[nan,5]", "[5]", "[nan]", "[inf,inf]", "\"\"", "[[]]"})
     EXPECT_THAT(refusal("[5,6], [7.5,8.25]]", std::string(bad) + ", [7.5,8.25]]"),
                 HasSubstr("or [] for one that is absent"))
@@ -504,7 +504,7 @@ TEST_F(StudyFile, ErrorsOfItsFilesNameTheLine) {
                   study.cases.front().places, "ct", [] { throw InputError("no HU"); });
             }),
             path() + ":4: case[0].ct: no HU");
-  // Of what the study does not name, and of other defects, nothing is said.
+  // Files that the study does not name, and other defects, get no line.
   EXPECT_EQ(message_of<FileError>([&] { naming_study_line(view.places, "mask", fails); }),
             "A.mha: is gone");
   EXPECT_THAT(
@@ -512,7 +512,7 @@ TEST_F(StudyFile, ErrorsOfItsFilesNameTheLine) {
       HasSubstr(path() + ":1: rig: "));
 }
 
-/// The template with every optional key in force.
+/// The template with every optional key uncommented.
 std::string uncommented(const std::string& text) {
   return std::regex_replace(text, std::regex("(^|\n)# ([a-z_]+ = )"), "$1$2");
 }

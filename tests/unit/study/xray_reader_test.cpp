@@ -212,7 +212,7 @@ TEST_F(DicomXrayView, TheSignOfTheRelationshipDecidesOverThePhotometricInterpret
     file.set_text(kPhotometricTag, "CS", "MONOCHROME1");
     file.set_text(kSignTag, "SS", std::string("\1\0", 2));
   }));
-  // Values that fall with intensity, though MONOCHROME2.
+  // Values fall with intensity although the file says MONOCHROME2.
   expect_lines_of_levels(read([](test::DicomTestFile& file) {
     file.set_text(kSignTag, "SS", std::string("\xff\xff", 2));
     std::vector<std::int16_t> pixels;
@@ -263,7 +263,8 @@ TEST_F(DicomXrayView, LogarithmsAreNoIntensitiesAndDisplayValuesAreWarnedOf) {
 constexpr test::DicomTestFile::Tag kPaddingTag = {0x0028, 0x0120};
 
 TEST_F(DicomXrayView, PaddingIsMaskedAndNeitherAirNorMetal) {
-  // Of kLevels the 500 becomes padding: by its own value, one above all, and one beyond the bits.
+  // The 500 of kLevels becomes padding: by a value below all others, one above all, and one beyond
+  // the bits.
   for (const int padding : {0, 4095, 63536}) {
     SCOPED_TRACE(padding);
     const auto pad = [&](test::DicomTestFile& file) {
@@ -275,8 +276,8 @@ TEST_F(DicomXrayView, PaddingIsMaskedAndNeitherAirNorMetal) {
     const ViewXray xray = read(pad);
     EXPECT_THAT(xray.mask.pixels, testing::ElementsAre(1, 1, 1, 0, 1, 1));
     EXPECT_NEAR(xray.attenuation.pixels[2], std::log(4.0), kLogRounding);
-    EXPECT_LE(xray.attenuation.pixels[3], xray.attenuation.pixels[2]) << "no metal";
-    EXPECT_GT(xray.attenuation.pixels[3], xray.attenuation.pixels[0]) << "no air";
+    EXPECT_LE(xray.attenuation.pixels[3], xray.attenuation.pixels[2]) << "padding is not metal";
+    EXPECT_GT(xray.attenuation.pixels[3], xray.attenuation.pixels[0]) << "padding is not air";
     EXPECT_THAT(xray.note, HasSubstr("16.7 % masked as padding (PixelPaddingValue"));
     const ViewXray turned = read([&](test::DicomTestFile& file) {
       pad(file);
@@ -644,7 +645,8 @@ TEST(XrayReader, DamagedEncodedFramesAreReadOrRefused) {
       }
     }
   }
-  EXPECT_EQ(was_refused.size(), 2U) << "some are refused, and pixels alone were changed in some";
+  EXPECT_EQ(was_refused.size(), 2U)
+      << "some must be refused, and some, with changed pixels only, must be read";
 }
 
 TEST(XrayReader, AMaskFileAndAnAutomaticMaskHideWhatEitherHides) {
@@ -742,7 +744,7 @@ TEST(XrayReader, AGridSeenThroughTheLensBecomesTheGrid) {
   float undone = 0.0f;
   for (int row = 0; row < 200; ++row)
     undone = std::max(undone, std::abs(stored.at(0, row) - grid({0.0, static_cast<double>(row)})));
-  EXPECT_GT(undone, 0.5f) << "the lens does something";
+  EXPECT_GT(undone, 0.5f) << "the lens must change something";
 }
 
 TEST(XrayReader, PixelsThatTheLensDoesNotShowAreMasked) {

@@ -59,8 +59,8 @@ TEST_P(FloatImageFormats, GiveTheSameBytesWhenWrittenTwice) {
   EXPECT_EQ(read_bytes(folder / GetParam()), read_bytes(folder / "again" / GetParam()));
 }
 
-/// Writes with all limits of file sizes from nothing to what is needed, as disks with less and less
-/// room would have it.
+/// Writes under limits of the file size from nothing to what is needed, as on disks with less and
+/// less room.
 template <typename Write>
 void expect_whole_or_nothing(const std::string& name, const Write& write) {
   const ScratchFolder folder;
@@ -81,7 +81,7 @@ void expect_whole_or_nothing(const std::string& name, const Write& write) {
   EXPECT_EQ(read_bytes(folder / name), whole);
 }
 
-/// Does not shrink much, and is larger than the buffers of libraries.
+/// Compresses little, and is larger than the buffers of libraries.
 Image2d noisy_image() {
   Image2d image(170, 130);
   HashRandom random(1);

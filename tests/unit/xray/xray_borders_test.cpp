@@ -127,8 +127,8 @@ TEST(XrayBorders, MaskMetalAtTheEdgeButNotDarkAnatomyThatLeavesThePicture) {
     }
 }
 
-/// A body that fills the picture but for a bright middle: dark towards the corners, without an
-/// edge.
+/// A body that fills the picture except for a bright middle. It grows dark towards the corners,
+/// without an edge.
 TEST(XrayBorders, AreNotDarkAnatomyThatFillsTheCorners) {
   const XrayBorders found = find_xray_borders(picture(160, 120, [](int c, int r) {
     const double away = std::hypot((c - 80) / 80.0, (r - 60) / 60.0);
@@ -138,7 +138,7 @@ TEST(XrayBorders, AreNotDarkAnatomyThatFillsTheCorners) {
   EXPECT_THAT(found.text(), HasSubstr("may be anatomy"));
 }
 
-/// The rest of the circle that fits a rounded corner would hide most of the picture.
+/// A circle fitted to a rounded corner would hide most of the picture.
 TEST(XrayBorders, TakeNoCircleForTheArcOfACorner) {
   const XrayBorders found = find_xray_borders(picture(160, 120, [](int c, int r) {
     return c < 30 && r < 30 && std::hypot(c - 30, r - 30) > 30 ? kShutter : -1.0f;

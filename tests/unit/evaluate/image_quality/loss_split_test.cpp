@@ -56,7 +56,7 @@ struct PlaneTap {
   PlaneTap(double a, double b)
       : node{static_cast<int>(a), static_cast<int>(b)}, weight{a - node[0], b - node[1]} {}
 
-  /// The mean over the four nodes around.
+  /// The weighted mean over the four nodes around.
   template <typename Value>
   [[nodiscard]] double mean_of(Value value) const {
     double sum = 0.0;
@@ -99,7 +99,7 @@ class PixelOracle {
     return static_cast<double>(
         caster_.total_attenuation(ct_from_slab_ * from, ct_from_slab_ * through));
   }
-  /// The viewpoints around the source's ray to a point, seeing that point.
+  /// What the viewpoints around the source's ray to a point see through that point.
   [[nodiscard]] double blended(const Vector3d& st_point) const {
     const RayNodes nodes = nodes_towards(st_point);
     return PlaneTap(nodes.u, nodes.v).mean_of([&](int u, int v) {

@@ -247,7 +247,8 @@ TEST(RegistrationStatistics, HaveCaptureRangesOfPatientsAndOverThem) {
       own["student_high"].get<double>(), 4.0 + 4.302652729749464 * 2 / std::sqrt(3.0), 1e-9);
   EXPECT_GE(own["low"].get<double>(), 2.0);
   EXPECT_LE(own["high"].get<double>(), 6.0);
-  // Drawn three times c: 6 mm, in 1 of 27 resamples; only b and c: at least 4 mm, in 8 of 27.
+  // Drawing c three times gives 6 mm, in 1 of 27 resamples. Drawing only b and c gives at least 4
+  // mm, in 8 of 27.
   const json& pooled = result["over_cases"]["pooled_capture_range_mm"];
   EXPECT_EQ(pooled["low"], 2.0);
   EXPECT_EQ(pooled["high"], 6.0);
@@ -298,7 +299,7 @@ TEST(RegistrationStatistics, SayWhetherRegistrationsKnowTheirErrors) {
   rows[1].verdict = rows[3].verdict = "doubtful";
   const json found = renderer_statistics(rows, "field", {1})["uncertainty"];
   EXPECT_EQ(found["pose_region_95"]["successes"], 2);
-  EXPECT_EQ(found["pose_region_95"]["cases"], 3);  // the failure is for the confidence to tell
+  EXPECT_EQ(found["pose_region_95"]["cases"], 3);  // failures are left to the confidence
   EXPECT_EQ(found["tre_region_95"]["successes"], 2);
   EXPECT_EQ(found["median_squared_distance"], 12.0);
   const json& confidence = found["confidence"];
@@ -325,7 +326,7 @@ TEST(RegistrationStatistics, CountCoverageOverCases) {
   EXPECT_FALSE(found["tre_region_95"].contains("starts"));
   EXPECT_EQ(found["tre_region_95"]["over_cases"]["cases"], 2);
   EXPECT_EQ(found["pose_region_95"]["successes"], 2);
-  // The gold standard is itself up to 0.7 mm off: 1.2 mm are within 1 mm and that.
+  // The gold standard is itself up to 0.7 mm off, so 1.2 mm agree with the predicted 1 mm.
   for (RegistrationRow& of_case : rows) of_case.gold_tre_95_mm = 0.7;
   found = renderer_statistics(rows, "field", {1})["uncertainty"];
   EXPECT_EQ(found["tre_region_95"]["successes"], 2);
@@ -336,7 +337,7 @@ TEST(RegistrationStatistics, IntervalsOverCasesNeedSeveral) {
   EXPECT_TRUE(renderer_statistics(rows, "field", {})["over_cases"]["rate"]["low"].is_null());
   rows.push_back(row("field", 0, 1, 0.4, "b"));
   const json over = renderer_statistics(rows, "field", {})["over_cases"];
-  // Drawn are a and a, a and b, or b and b: rates 1/2, 2/3, 1; mean TRE 0.2, 0.3, 0.4.
+  // Resamples are a and a, a and b, or b and b: rates 1/2, 2/3, 1; mean TRE 0.2, 0.3, 0.4.
   EXPECT_EQ(over["rate"]["low"], 0.5);
   EXPECT_EQ(over["rate"]["high"], 1.0);
   EXPECT_EQ(over["rate"]["cases"], 2);
@@ -368,7 +369,7 @@ TEST(RegistrationStatistics, OfCasesThatAllSucceedHaveNoSpreadOverCases) {
   EXPECT_TRUE(rate["student_low"].is_null());
 }
 
-// Three true poses of one patient are no three patients: there is no interval over patients.
+// Three true poses of one patient are not three patients, so there is no interval over patients.
 TEST(RegistrationStatistics, CasesOfOnePatientAreOnePatient) {
   const Rows rows = {row("field", 0, 1, 0.2, "head-002-p1"),
                      row("field", 0, 1, 0.3, "head-002-p2"),
@@ -383,7 +384,8 @@ TEST(RegistrationStatistics, CasesOfOnePatientAreOnePatient) {
   EXPECT_EQ(patient_count(std::vector<std::string>{"head-002-p1", "head-002-p2", "skull"}), 2u);
 }
 
-// One view shows no depth: 40 mm along its beam, the place is right; 5 mm across it, it is wrong.
+// One view shows no depth. An end 40 mm off along the beam is right; one 5 mm off across it is
+// wrong.
 TEST(RegistrationStatistics, OfOneViewAreByMrpd) {
   Rows rows = {row("field", 0, 1, 40.0), row("field", 1, 1, 5.0)};
   rows[0].errors.mrpd_mm = 0.4;
@@ -419,7 +421,7 @@ TEST(RegistrationStatistics, OfOneViewAreByMrpd) {
   EXPECT_EQ(result["uncertainty"]["confidence"]["roc_area"], 1.0);
 }
 
-// The depth of two views is no column's number; an end without a pose is infinitely deep.
+// With two views no depth is reported. With one, an end without a pose counts as infinitely deep.
 TEST(RegistrationStatistics, HaveDepthOfOneViewAlone) {
   Rows rows = {row("field", 0, 1, 0.2), row("field", 1, 1, std::nan(""))};
   EXPECT_EQ(renderer_statistics(rows, "field", {})["depth_of_all_mm"]["count"], 0);
@@ -467,7 +469,8 @@ TEST(PairedStatistics, TakeOnlyStartsThatBothWereGiven) {
   EXPECT_TRUE(result["mean_difference_over_cases_mm"]["low"].is_null());
 }
 
-/// Both succeed but from the last start, and field ends 0.1 mm closer from the first.
+/// Field ends 0.1 mm closer from the first start and fails from the last. All other registrations
+/// succeed alike.
 Rows paired_rows(std::int64_t starts) {
   Rows rows;
   for (std::int64_t start = 0; start < starts; ++start) {
@@ -492,7 +495,7 @@ TEST(PairedStatistics, TestNothingOnFewerThanTenPairs) {
   EXPECT_GT(test["equivalence_power"].get<double>(), 0.0);
 }
 
-// Field's ends lie 30 mm deeper, which one view does not show: both succeed, and alike.
+// Field's ends lie 30 mm deeper, which one view does not show. So both succeed alike.
 TEST(PairedStatistics, OfOneViewAreByMrpd) {
   Rows rows;
   for (std::int64_t start = 0; start < 10; ++start)
@@ -533,10 +536,10 @@ TEST(PairedStatistics, OppositeErrorsOfEqualLengthDoNotCancelInTheDistance) {
         const double side = std::string(renderer) == "field" ? 0.3 : -0.3;
         rows.back().final_deg_mm = {0, 0, 0, side, 0, 0};
       }
-  // One start that both lost: it counts among all, not among the pairs.
+  // Both lost one start. It counts among all, but not among the pairs.
   rows[0].tre_mm = rows[1].tre_mm = 9.0;
   const json result = paired_statistics(rows, {0.5, 1, kSuccessTreMm, shift_between});
-  EXPECT_EQ(result["test"]["equivalence_p"], 0.0) << "lengths of TRE see nothing";
+  EXPECT_EQ(result["test"]["equivalence_p"], 0.0) << "the lengths of the TREs show no difference";
   const json& ends = result["end_distance_mm"];
   EXPECT_EQ(ends["pairs"]["count"], 23);
   EXPECT_EQ(ends["all"]["count"], 24);
@@ -547,7 +550,7 @@ TEST(PairedStatistics, OppositeErrorsOfEqualLengthDoNotCancelInTheDistance) {
   EXPECT_EQ(wide["end_distance_mm"]["is_equivalent"], true);
 }
 
-/// Twelve patients whose ends agree where both succeed; of each, field loses some of 20 starts.
+/// Twelve patients whose ends agree where both succeed. Field loses some of the 20 starts of each.
 json ends_when_field_loses(std::int64_t lost_of_first, std::int64_t lost_of_others) {
   Rows rows;
   for (int patient = 0; patient < 12; ++patient)
@@ -691,7 +694,7 @@ TEST(RegisteredRow, OfARegistrationThatThrowsIsAFailure) {
       yardstick_at_origin());
   EXPECT_EQ(found.stop_reason, "error");
   EXPECT_EQ(found.error, "the histogram is empty");
-  EXPECT_TRUE(found.has_one_view) << "of the case, not of the end";
+  EXPECT_TRUE(found.has_one_view) << "the case decides, not the end";
   EXPECT_TRUE(std::isnan(found.tre_mm));
   EXPECT_EQ(registrations_table(Rows{found}).text(0, "success"), "0");
 }
@@ -925,7 +928,7 @@ TEST(PoseDistances, RefuseRunsOfDifferentXrays) {
                              testing::HasSubstr("case skull, view B")));
   hashes.erase("skull: xray B");
   EXPECT_THAT(refusal(), testing::HasSubstr("case skull, view B"));
-  // Another program's poses, of X-rays that are not there, state none.
+  // A run of another program's poses may lack the X-rays, and then states no hashes.
   hashes = json::object();
   EXPECT_EQ(pose_distances({first, second}).size(), 1u);
 }
@@ -964,7 +967,7 @@ TEST(MethodComparison, PairsAreThoseOfTheSummary) {
     rows.push_back(row("raycast", start, 1, raycast_mm));
   }
   EvaluationRun run{"runs/skull-fast", {}};
-  // With end poses 0.25 mm apart, of one patient: nothing is claimed.
+  // End poses 0.25 mm apart, but of one patient: nothing is claimed.
   for (RegistrationRow& each : rows) each.final_deg_mm = {};
   for (std::size_t i = 0; i < rows.size(); i += 2) rows[i].final_deg_mm[3] = 0.25;
   run.summary["field_against_raycast"] =

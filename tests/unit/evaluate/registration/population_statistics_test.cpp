@@ -54,7 +54,7 @@ TEST(PopulationStatistics, OfHandMadePatients) {
   EXPECT_DOUBLE_EQ(success.rate.bootstrap.high, 1.0);
   EXPECT_DOUBLE_EQ(success.pooled_interval_mm.low, 4.0);
   EXPECT_DOUBLE_EQ(success.pooled_interval_mm.high, 10.0);
-  // Student's with one degree of freedom: 0.7 +- 12.706 * 0.3.
+  // Student's interval with one degree of freedom: 0.7 +- 12.706 * 0.3.
   EXPECT_NEAR(success.rate.student.high, 0.7 + 12.706 * 0.3, 1e-3);
   EXPECT_EQ(success.capture_lower_bounds, 1);
 }

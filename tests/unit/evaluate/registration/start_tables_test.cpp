@@ -83,10 +83,10 @@ TEST_F(TableOfPoses, StartsOfACaseThatTheStudyLacksAreRefused) {
 TEST_F(TableOfPoses, FilesOfAFolderNameTheirCaseWhereThereAreSeveral) {
   for (const char* name : {"skull-01-0.toml", "1.toml"})
     test::write_input(folder_ / name, "room_from_ct = [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]\n");
-  PoseTableFrames of = frames();
-  EXPECT_EQ(read_found_poses(folder_.path(), of).room_from_ct.size(), 2U);
-  of.is_only_case = false;
-  EXPECT_THAT(message_of<InputError>([&] { read_found_poses(folder_.path(), of); }),
+  PoseTableFrames table = frames();
+  EXPECT_EQ(read_found_poses(folder_.path(), table).room_from_ct.size(), 2U);
+  table.is_only_case = false;
+  EXPECT_THAT(message_of<InputError>([&] { read_found_poses(folder_.path(), table); }),
               HasSubstr("1.toml: does not say of which case"));
 }
 

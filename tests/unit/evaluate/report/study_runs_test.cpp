@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What runs over several patients and fields make of their rows.
+// What runs over several patients and fields compute from their rows.
 #include <cmath>
 
 #include <gmock/gmock.h>

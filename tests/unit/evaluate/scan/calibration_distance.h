@@ -5,10 +5,10 @@
 
 namespace af::test {
 
-/// Distance from camera to camera on the detector when one object is seen by both, px (root mean
-/// square over points of a cylinder about the axis and the scan's angles), after the rigid motion
-/// and the change of size of the object that make it smallest: projections do not tell where an
-/// object lies and how large it is. Two calibrations are one when this is 0.
+/// How far apart two calibrations project one object on the detector, px: the root mean square over
+/// points of a cylinder about the axis and over the scan's angles. Projections do not tell where an
+/// object lies or how large it is, so the rigid motion and the scaling that make the distance
+/// smallest are applied first. Equivalent calibrations have distance 0.
 double calibration_distance_px(const CircularScan& scan,
                                const ScanCalibration& a,
                                const ScanCalibration& b,

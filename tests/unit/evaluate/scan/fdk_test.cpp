@@ -26,7 +26,7 @@ INSTANTIATE_TEST_SUITE_P(Axes, FdkAlong, testing::Values(AxisAlong::Columns, Axi
 
 TEST_P(FdkAlong, OfABallGivesItsAttenuationWhereItIs) {
   const CircularScan scan = small_scan(GetParam());
-  // A detector off its place, turned and tilted, as the camera says.
+  // The camera states a detector off its place, turned and tilted.
   ScanCalibration truth = ScanCalibration::nominal(scan, {1, sweep_of(scan)});
   truth.column_px.coefficients << 32.0, 1.0, -2.0, 0.5;
   truth.row_px.coefficients << 31.0, -1.0, 0.5, -0.5;
@@ -132,7 +132,7 @@ TEST(LightShare, KeepsPlasticBesideMetal) {
   EXPECT_NEAR(reference_mu_per_mm(volume), 0.4, 1e-6);
   EXPECT_NEAR(light_share(volume, 0.04), 0.5, 0.01);
   const double water = registration_water_mu_per_mm(volume);
-  EXPECT_LT(0.1 * water, 0.02) << "plastic is no air";
+  EXPECT_LT(0.1 * water, 0.02) << "plastic is not air";
   EXPECT_GT(33.0 * water, 0.8) << "steel is within the scale";
   // Without metal nothing changes.
   for (std::size_t i = 990; i < 1000; ++i) volume.mu_per_mm[i] = 0.02F;

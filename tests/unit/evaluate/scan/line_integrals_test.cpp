@@ -46,7 +46,7 @@ struct Detector {
   }
 };
 
-/// Every tenth view as counted.
+/// Every tenth view, in counts.
 std::vector<Image2d> twelve_views(const Detector& detector, const ScanImages& images) {
   std::vector<Image2d> counts;
   for (int view = 0; view < 12; ++view)
@@ -85,7 +85,8 @@ TEST_P(AirLevelAlong, IsFoundAroundAnObjectUnderStripesAndDrift) {
       lit += 1.0;
     }
   }
-  // The mean over the object, most of which no air level was seen on: the fit is extrapolated.
+  // The mean over the object. Most of its pixels never showed air, so the fit is extrapolated
+  // there.
   EXPECT_NEAR(error / lit, 0.0, 0.003);
   EXPECT_EQ(level.is_lit[0], 0) << "the dark corner";
   EXPECT_EQ(level.is_air[static_cast<std::size_t>(30 * scan.size_px.x() + 30)], 0) << "the object";
@@ -110,8 +111,8 @@ TEST(LineIntegrals, FromAFlatImageAreExact) {
 
 TEST(LineIntegrals, FromAFlatOfAnotherExposureAreThoseOfTheObject) {
   const CircularScan scan = small_scan();
-  // Beside a ball half as wide as the detector there is air. It lies on the axis: no pixel changes
-  // from view to view but by noise and the tube's drift.
+  // Beside a ball half as wide as the detector there is air. The ball lies on the axis, so only
+  // noise and the tube's drift change pixels from view to view.
   const ScanImages images = simulated_scan(
       scan, ScanCalibration::nominal(scan), {test::Ball{{0.0, 0.0, 0.0}, 8.0, 0.03}});
   const Detector detector{true, 0.02};

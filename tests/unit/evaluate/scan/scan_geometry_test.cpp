@@ -200,7 +200,7 @@ TEST(AngleShares, AreHalfTheGapsAndFillTheCircle) {
   constexpr double kDeg = std::numbers::pi / 180.0;
   const std::vector<double> shares =
       angle_shares_rad({0.0, 90.0 * kDeg, 120.0 * kDeg, 240.0 * kDeg, 360.0 * kDeg});
-  // 0 and 360 are one place that two views share.
+  // Two views share one place, at 0 and 360 degrees.
   EXPECT_NEAR(shares[0] + shares[4], (120.0 + 90.0) / 2.0 * kDeg, kRounding);
   EXPECT_NEAR(shares[1], (90.0 + 30.0) / 2.0 * kDeg, kRounding);
   EXPECT_NEAR(shares[2], (30.0 + 120.0) / 2.0 * kDeg, kRounding);

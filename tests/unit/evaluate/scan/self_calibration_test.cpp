@@ -31,7 +31,8 @@ SelfCalibrationOptions quick_options() {
   return options;
 }
 
-/// A detector off its place whose foot and rotation wobble and drift, and farther than stated.
+/// A detector off its place and farther away than stated. The beam's foot and the rotation wobble
+/// and drift.
 ScanCalibration wobbling(const CircularScan& scan) {
   ScanCalibration truth = ScanCalibration::nominal(scan, {2, sweep_of(scan)});
   truth.source_to_detector_mm *= 1.02;
@@ -61,7 +62,7 @@ TEST(SelfCalibration, FindsAKnownWobbleFromEvenViewsForOddOnes) {
   EXPECT_NEAR(found.row_px.coefficients[5], truth.row_px.coefficients[5], 0.1);
   const double held_out = held_out_residual(images, found, even, odd, options, pool).rms_px;
   EXPECT_LT(held_out, 0.05);
-  // A wrong geometry shows. The reconstruction shares it and yields: half of its 0.35 px remain.
+  // A wrong geometry shows, although the reconstruction adapts to it. Half of its 0.35 px remain.
   ScanCalibration wrong = found;
   wrong.column_px.coefficients[3] += 0.5;
   EXPECT_GT(held_out_residual(images, wrong, even, odd, options, pool).rms_px, 0.15);
@@ -152,7 +153,7 @@ TEST(ViewAlignment, FindsAKnownMotion) {
   EXPECT_NEAR(alignment.gain, 1.3, 0.05);
 }
 
-/// What a reconstruction blurs stays; what is gone leaves more than its edges.
+/// A blurred prediction leaves a small residual; an object that has moved away leaves a large one.
 TEST(ViewAlignment, ResidualsTellWhatMovedFromWhatIsPredictedRoughly) {
   const CircularScan scan = small_scan();
   const ScanCalibration here = ScanCalibration::nominal(scan);

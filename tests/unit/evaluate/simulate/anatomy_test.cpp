@@ -58,7 +58,7 @@ TEST(Habitus, LeavesTheTypicalAdultAloneAndHasTheJacobianOfItsMap) {
 }
 
 TEST(ShapedPhantom, KeepsCapsulesJoined) {
-  // The ends of neighbouring pieces of a rib are one point before, and so after the map.
+  // Neighbouring pieces of a rib share an end point before the map, so they share one after it.
   const auto ends = [](const Solid& solid, double side) {
     return Vector3d(solid.center_mm + side * solid.half_sizes_mm.z() * solid.rotation.col(2));
   };

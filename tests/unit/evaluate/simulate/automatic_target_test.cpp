@@ -59,7 +59,7 @@ TEST(AutomaticTarget, FallsBackToTheCentroidWithoutBone) {
 
 TEST(AutomaticTarget, FindsTheMiddleVertebraOfTheSpinePhantom) {
   const RegistrationTarget target = find_target(sample_phantom(spine_phantom(false), {2.0, 1, 0}));
-  // Within half a vertebral pitch along the spine, and on it across.
+  // Within half a vertebral pitch along the spine, and within the vertebra across it.
   EXPECT_LT(std::abs(target.center_ct_mm.z()), 16.5);
   EXPECT_LT(std::abs(target.center_ct_mm.x()), 8.0);
   EXPECT_GT(target.center_ct_mm.y(), -5.0);

@@ -69,7 +69,7 @@ int hu_at(const Phantom& phantom, const Vector3d& point) {
   return kGasHu;
 }
 
-/// Uniform in the body's box; none when it is not in the body.
+/// A point drawn uniformly from the body's box; none when it misses the body.
 std::optional<Vector3d> drawn_point(const Solid& solid, HashRandom& random) {
   const double x = random.uniform(-1.0, 1.0);
   const double y = random.uniform(-1.0, 1.0);
@@ -80,7 +80,7 @@ std::optional<Vector3d> drawn_point(const Solid& solid, HashRandom& random) {
   return point;
 }
 
-/// Points of a plane through the bone that rays of source_point pass.
+/// Points of a plane through the bone, for rays from source_point to pass through.
 std::vector<Vector3d> screen(const PhantomBone& bone) {
   constexpr double kStepMm = 4.0;
   constexpr double kReachMm = 100.0;
@@ -134,8 +134,9 @@ TEST_P(EveryMovedBone, DiffersWithinItsShadowsAndNowhereElse) {
 }
 
 TEST_P(EveryMovedBone, IsSeenByARayWhereItsPoseSaysIt) {
-  // The moved bone in the pose of the rest is the unmoved one in the gold pose, with its texture.
-  // Of some hundred steps of up to 1.5 mm, a few may round to another HU: 0.0015 mm each.
+  // The moved bone in the pose of the rest is the unmoved one in the gold pose, with its texture. A
+  // ray takes some hundred steps of up to 1.5 mm. A few of them may round to another HU: 0.0015 mm
+  // each.
   constexpr double kToleranceMm = 0.02;
   Phantom old_bodies = alone(still_, bone_);
   Phantom new_bodies = alone(moved_, bone_);
@@ -172,7 +173,7 @@ TEST_P(EveryMovedBone, LeavesSoftTissueWhereItWas) {
 }
 
 TEST_P(EveryMovedBone, HardlyRunsIntoWhatStays) {
-  // Some bodies overlap at joints at rest, too. 3 %: 0.2 mm of a plate that is 7 mm thick.
+  // At joints some bodies overlap at rest, too. 3 % are 0.2 mm of a plate that is 7 mm thick.
   constexpr double kMostShare = 0.03;
   Phantom rest = still_;
   std::erase_if(rest.solids, [&](const Solid& solid) { return solid.bone == bone_; });
@@ -221,7 +222,7 @@ TEST(MovedBone, TurnsAndShiftsByWhatIsStated) {
 }
 
 TEST(MovedBone, TakesItsImplantsAlong) {
-  // A patient with a prosthesis: no metal of the femur stays, and the cup does.
+  // In a patient with a prosthesis all metal of the femur goes, and the cup stays.
   const Phantom phantom = make_phantom("pelvis", true, kPatient);
   const auto is_metal = [](const Solid& solid) { return solid.hu >= kTitaniumHu; };
   const Phantom femur = alone(phantom, "left-femur");

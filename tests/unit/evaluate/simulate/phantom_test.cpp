@@ -97,10 +97,10 @@ double analytic_integral(const std::vector<Solid>& solids,
 class EveryPhantom : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(EveryPhantom, HasTheLineIntegralsOfItsBodies) {
-  // A voxel is the mean over 1.4 mm across the ray, which meets a tilted surface up to 0.7 mm (RMS
-  // 0.4 mm) before or behind that mean's place, to both sides alike: with steps of about one water
-  // and some seventy surfaces (shells and cores) on a ray, 0.4 mm * sqrt(70) = 3.4 mm. Over the
-  // mean of 500 rays of at least 100 mm that leaves 0.15 %.
+  // A voxel is the mean over 1.4 mm across the ray. The ray meets a tilted surface up to 0.7 mm
+  // (RMS 0.4 mm) before or behind that mean's place, to both sides alike. Surfaces are steps of
+  // about one water, and a ray meets some seventy of them (shells and cores): 0.4 mm * sqrt(70) =
+  // 3.4 mm. Over the mean of 500 rays of at least 100 mm that leaves 0.15 %.
   constexpr double kRmsMm = 3.4;
   constexpr double kMeanShare = 0.0015;
   Phantom phantom = make_phantom(GetParam(), false);

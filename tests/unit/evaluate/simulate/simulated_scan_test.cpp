@@ -31,7 +31,7 @@ ConeBeamOptions views(int count) {
   return options;
 }
 
-/// Coordinates up to some 1500 mm, of which rounding takes 1e-13.
+/// Coordinates reach some 1500 mm, and each operation rounds them by up to 1e-13 mm.
 constexpr double kRoundingMm = 1e-9;
 
 TEST(SimulatedScan, HasTheCamerasDistancesAndFoot) {
@@ -63,7 +63,7 @@ TEST(SimulatedScan, LiftsCamerasOnASphereThatLookAtTheOrigin) {
   for (const CameraGeometry& camera : {flat, lifted}) {
     EXPECT_NEAR(camera.source_point.norm(), 1000.0, kRoundingMm);
     EXPECT_LT((camera.project(Eigen::Vector3d::Zero()) - Eigen::Vector2d(55.0, 42.0)).norm(), 1e-9);
-    // From above the circle its source still stands over the same place of it.
+    // The lifted source still stands over the same place on the circle.
     EXPECT_NEAR(camera.source_point.x() * flat.source_point.y(),
                 camera.source_point.y() * flat.source_point.x(),
                 1e-6);

@@ -217,9 +217,9 @@ TEST(SolidProjector, FollowsAMotionThatTheSampledAnatomyHas) {
 }
 
 TEST(SolidProjector, FindsSmallBodiesThatAMotionMovesByMoreThanTheirSize) {
-  // Every ray goes through a point where the moved anatomy shows a ball's centre. Against points
-  // every 0.01 mm of the ray: pieces of 8 mm miss the motion by 0.06 mm, which at the rim of a ball
-  // of 3 mm is a chord of 1.2 mm.
+  // Every ray goes through a point where the moved anatomy shows a ball's centre. The oracle
+  // samples the ray every 0.01 mm. Pieces of 8 mm miss the motion by 0.06 mm, which at the rim of a
+  // ball of 3 mm is a chord of 1.2 mm.
   constexpr double kRadiusMm = 3.0;
   constexpr double kStepMm = 0.01;
   constexpr double kToleranceMm = 1.2 + 2.0 * kStepMm;
@@ -251,8 +251,8 @@ TEST(SolidProjector, FindsSmallBodiesThatAMotionMovesByMoreThanTheirSize) {
 class EveryDrawnPatient : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(EveryDrawnPatient, ShowsInXraysWhatItsCtHolds) {
-  // As EveryPhantom.HasTheLineIntegralsOfItsBodies, but of voxels of 2 mm and with textures, which
-  // add 60 HU over 4 mm, some 30 times: 1.3 mm.
+  // Like EveryPhantom.HasTheLineIntegralsOfItsBodies, but with voxels of 2 mm and with textures.
+  // These add 60 HU over 4 mm, some 30 times: 1.3 mm.
   constexpr double kRmsMm = 6.0;
   constexpr double kMeanShare = 0.005;
   const Phantom phantom = make_phantom(GetParam(), false, 4);

@@ -159,7 +159,7 @@ TEST(PerturbedStarts, CountDrawsThatThePredicateRefuses) {
   EXPECT_EQ(result.inadmissible_per_interval[0], 0u);
   EXPECT_GT(result.inadmissible_per_interval[7], 0u);
   for (const PerturbedStart& start : result.starts) EXPECT_TRUE(limited(start.room_from_ct));
-  // All draws but those beyond, each in its interval.
+  // Every draw counts in its interval, except those beyond the last.
   ASSERT_EQ(result.draws_per_interval.size(), 8u);
   EXPECT_EQ(
       std::accumulate(
@@ -188,9 +188,9 @@ TEST(RotationShare, IsOneHalfWhereNothingIsRefused) {
   ASSERT_EQ(result.rotation_share_per_interval.size(), 8u);
   double mean = 0.0;
   for (const double share : result.rotation_share_per_interval) mean += share / 8.0;
-  // A pure rotation moves the box by 0.7 to 0.8 of its magnitude: farther draws with much rotation
-  // fall into nearer intervals, which leaves the same share in each where none end; the last
-  // intervals still have all, since draws reach 1.5 times the end.
+  // A pure rotation moves the box by 0.7 to 0.8 of its magnitude, so draws with much rotation fall
+  // into nearer intervals. Where draws go on, this leaves the same share in each interval. The last
+  // intervals get theirs, too, since draws reach 1.5 times the end.
   EXPECT_NEAR(mean, 0.5, 5 * 0.25 / std::sqrt(3200.0) + 0.01);
 }
 
@@ -251,11 +251,12 @@ TEST(PerturbedStarts, WithinRangeLieInsideByDesign) {
   }
   for (int interval = 0; interval < 8; ++interval) EXPECT_EQ(per_interval[interval], 20);
   EXPECT_EQ(result.draws, 160u + result.inadmissible_draws);
-  // Near gold nothing is held back; far from it rotations are, but no farther than the range.
+  // Near gold nothing is scaled down. Far from it rotations are, but no further than the range
+  // demands.
   EXPECT_NEAR(result.rotation_share_per_interval[0], 0.5, 5 * 0.25 / std::sqrt(20.0));
   EXPECT_GT(result.rotation_share_per_interval[7], 0.1);
   EXPECT_LT(result.rotation_share_per_interval[7], 0.5);
-  // The same again, and other starts with another seed.
+  // The same seed gives the same starts, another seed gives others.
   EXPECT_EQ(starts_within_range(measures).starts[77].parameters.deg_and_mm(),
             result.starts[77].parameters.deg_and_mm());
   options.seed = 2;
@@ -336,7 +337,7 @@ TEST(PerturbedStarts, UniformSayWhichTreHasNoAdmissibleStart) {
 }
 
 TEST(PerturbedStarts, AreTheSameInManyParts) {
-  // More than are asked for at once; few points, for time.
+  // More starts than one batch draws; few points, to save time.
   const StartFrame frame = test::example_start_frame();
   const auto points = target_points(frame.target_box_ct, 60.0);
   const StartOptions options{2, 2.0, 35000, 1};

@@ -36,7 +36,7 @@ TEST(CaseBootstrap, DependsOnTheSeedAlone) {
 }
 
 TEST(CaseBootstrap, CountsReplicatesWithoutAValue) {
-  // Two cases, of which the second has none: it alone is drawn in a quarter of the replicates.
+  // Of two cases the second has no value. A quarter of the replicates draw only that one.
   const std::vector<double> values = {1.0, std::nan("")};
   const CaseBootstrap result = bootstrap_over_cases(
       2, [&](auto drawn) { return drawn[0] == 1 && drawn[1] == 1 ? std::nan("") : values[0]; }, 1);
@@ -63,7 +63,7 @@ TEST(IntervalCoverage, OfTheBootstrapGrowsWithTheCases) {
   EXPECT_LT(four.bootstrap_rate, ten.bootstrap_rate);
   EXPECT_LT(ten.bootstrap_rate, thirty.bootstrap_rate);
   EXPECT_LT(four.bootstrap_tre, ten.bootstrap_tre);
-  // From there on no warning is given.
+  // From thirty cases on no warning is given.
   EXPECT_GT(thirty.bootstrap_rate, 0.93 - 0.01);
   EXPECT_LT(four.bootstrap_rate, 0.90) << "the warning about few cases would be wrong";
   // Student's interval is the remedy: within 3 % of what it claims, with four cases as with thirty.

@@ -74,7 +74,8 @@ TEST(CaseEquivalence, RefusesWhatIsNoDistanceOrNoMargin) {
 }
 
 TEST(CaseEquivalence, IsRarelyClaimedWrongly) {
-  // Patients whose true mean is exactly the margin: every claim is wrong. Skewed as distances are.
+  // The true mean of these patients is exactly the margin, so every claim is wrong. Their values
+  // are skewed, as distances are.
   const auto claims = [](std::size_t cases) {
     return test::wrong_equivalence_claims(
         {.cases = cases, .log_sd = 0.4, .studies = 1000, .seed = 1, .replicates = 200});

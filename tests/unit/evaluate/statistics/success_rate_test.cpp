@@ -95,7 +95,7 @@ TEST(CumulativeCaptureRange, CountsFailuresWithoutAPoseAndTakesEqualErrorsTogeth
   EXPECT_FALSE(cumulative_capture_range({}).has_value());
 }
 
-/// 20 starts per interval of 2 mm; so many of them succeed.
+/// Intervals of 2 mm, each with `starts` starts; `successes` says how many of them succeed.
 std::vector<IntervalSuccess> intervals_with(const std::vector<int>& successes, int starts = 20) {
   std::vector<IntervalSuccess> intervals;
   for (std::size_t k = 0; k < successes.size(); ++k) {
@@ -144,7 +144,8 @@ TEST(CaptureRange, SaysWhetherTheStudyEndsFirst) {
 }
 
 TEST(CaptureRange, IsNeverFartherThanTheCumulativeOne) {
-  // Both from the same random outcomes: what every interval has, all of them together have.
+  // Both ranges come from the same random outcomes. A rate that every interval reaches, all of them
+  // together reach.
   for (std::uint64_t study = 0; study < 200; ++study) {
     HashRandom random(7, study);
     std::vector<TreOutcome> outcomes;

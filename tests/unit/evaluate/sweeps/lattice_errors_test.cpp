@@ -32,7 +32,7 @@ TEST(LatticeErrors, StepsMoveEveryCameraByOneCell) {
   const std::array<CellView, 2> views = two_views();
   const Eigen::Vector3d center(5, -3, 8);
   const std::array<PoseParameters, kCellAxes> steps = cell_steps(views, center);
-  // A turn by one cell of 73 mm is 0.03 rad; what is not linear in a tenth of it is 2e-5 of it.
+  // A turn by one cell of 73 mm is 0.03 rad. In a tenth of it, the nonlinear part is 2e-5 of it.
   constexpr double kPart = 0.1;
   constexpr double kNotLinear = 1e-2;
   for (std::size_t axis = 0; axis < kCellAxes; ++axis)
@@ -44,7 +44,7 @@ TEST(LatticeErrors, StepsMoveEveryCameraByOneCell) {
           PoseFrame::about(RigidTransform(Eigen::Translation3d(center)), Eigen::Vector3d::Zero());
       const RigidTransform moved =
           pose_from_parameters(frame, part) * frame.nominal_room_from_ct().inverse();
-      // Where the camera is as seen from the patient.
+      // How the camera moves as seen from the patient.
       const Eigen::Vector3d change =
           moved.inverse() * view.camera.source_point - view.camera.source_point;
       const Eigen::Vector3d along =

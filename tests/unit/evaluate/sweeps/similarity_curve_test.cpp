@@ -42,7 +42,7 @@ TEST(CurvePeak, WidthIsReadAtHalfHeightAboveTheBase) {
   const std::vector<double> offsets = {-3, -2, -1.5, 0, 1.5, 2, 3};
   const std::vector<double> values = {1, 1, 1.5, 3, 1.5, 1, 1};
   EXPECT_NEAR(find_peak(offsets, values, 1.0).width, 2.0, kCurveRounding);
-  // Half height of 0.25 above 2.75 is reached nowhere between samples but by the same lines.
+  // Above a base of 2.5 half height is 2.75, which the lines beside the peak reach at +-0.25.
   EXPECT_NEAR(find_peak(offsets, values, 2.5).width, 0.5, kCurveRounding);
 }
 

@@ -285,7 +285,7 @@ TEST(PrecomputeOptions, AnAtlasHasItsOwnPreset) {
   EXPECT_NE(of_atlas, of_field);
   options.preset = kDefaultPreset;
   EXPECT_EQ(options.in_force().design(), of_field);
-  // Parts that are typed make it the paper's, as a field's.
+  // A typed part makes the other parts the paper's, as for a single field.
   options.preset.reset();
   options.uv_nodes = 12;
   EXPECT_EQ(options.design().slabs, 1);

@@ -88,7 +88,7 @@ TEST_F(TrilinearFieldCasterTest, SamplesDoNotDependOnThePlanOrTheVectorWidth) {
 }
 
 TEST_F(TrilinearFieldCasterTest, RaysRunPastThePlane) {
-  // With the (s,t) plane above the whole CT nothing would be met before it.
+  // The (s,t) plane lies above the whole CT, so rays meet nothing before it.
   light_slab_.slabs[0].st_plane_y_mm = 300.0;
   const TrilinearFieldCaster caster(volume_, light_slab_, quantizer_, options_);
   const NodeSamples samples = cast_plan(caster, light_slab_, {1000000});

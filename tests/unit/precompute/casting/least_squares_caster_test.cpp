@@ -52,8 +52,8 @@ LightSlab planes_of(int u_nodes, int v_nodes) {
 }
 
 LeastSquaresFieldCaster fitting(const LightSlab& planes, const SampleAt& sample_at) {
-  return {planes, [&](const LightSlab& of) {
-            return std::make_unique<const FunctionCaster>(of, sample_at);
+  return {planes, [&](const LightSlab& cast_planes) {
+            return std::make_unique<const FunctionCaster>(cast_planes, sample_at);
           }};
 }
 
@@ -63,8 +63,8 @@ int noise_at(double u_mm, double v_mm, int s, int t) {
   return static_cast<int>(65535.0 * (mixed - std::floor(mixed)));
 }
 
-/// Value at x = 0 of the line that comes nearest to f(0), f(1/2), f(1), with Simpson's weights:
-/// the normal equations, solved here by themselves.
+/// Value at x = 0 of the line that comes nearest to f(0), f(1/2), f(1), with Simpson's weights.
+/// Solves the normal equations independently of the caster.
 double start_of_line(double first, double halfway, double last) {
   Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
   Eigen::Vector2d right = Eigen::Vector2d::Zero();

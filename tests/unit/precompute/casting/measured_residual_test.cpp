@@ -138,8 +138,8 @@ TEST(MeasuredResidual, PartsOfARaySumToTheWhole) {
   EXPECT_NEAR(sum, whole, 1e-12);
 }
 
-/// In a uniform box the mean over a ray's points of an image that is linear in its rows is an
-/// integral in closed form, from where the ray enters the CT's grid to where it leaves.
+/// The image is linear in its rows. In a uniform box its mean over a ray's points is an integral in
+/// closed form, from where the ray enters the CT's grid to where it leaves.
 TEST(MeasuredResidual, AboveTheCircleIsTheMeanOverTheRaysPoints) {
   const auto of_row = [](std::size_t, int, int row) { return 0.1 * row; };
   const Views views(angles(4.0), of_row);
@@ -154,9 +154,9 @@ TEST(MeasuredResidual, AboveTheCircleIsTheMeanOverTheRaysPoints) {
     const double mean = 1.0 - kRadiusMm / (2.0 * kHalfDepthMm) *
                                   std::log((kRadiusMm + kHalfDepthMm) / (kRadiusMm - kHalfDepthMm));
     const double expected = 0.1 * (30.0 + height_mm / kRadiusMm * kDistanceMm / kPixelMm * mean);
-    // The box's faces lie half a voxel of 4 mm within cells that are a voxel wide: midpoints of
-    // steps of about one voxel are that far from the integral's ends, on both sides. What one
-    // step of the 12 at an end changes is at most its 1/12 of the half range of rows.
+    // The box's faces lie half a voxel of 4 mm within cells that are a voxel wide. Midpoints of
+    // steps of about one voxel are that far from the integral's ends, on both sides. One step of
+    // the 12 at an end changes at most 1/12 of the half range of rows.
     const double half_range =
         0.1 * height_mm / kRadiusMm * kDistanceMm / kPixelMm * kHalfDepthMm / kRadiusMm;
     EXPECT_NEAR(residual.along(start, Eigen::Vector3d::Zero(), 0.0, kInfinity),
@@ -225,8 +225,8 @@ TEST(MeasuredResidual, CountsPointsThatAViewDoesNotSeeAsZero) {
     return residual.along(
         Eigen::Vector3d(0.0, -kRadiusMm, height_mm), Eigen::Vector3d::Zero(), 0.0, kInfinity);
   };
-  // The ray falls through the plane in the box's middle: the further half of its points is seen.
-  // One of its points, one per voxel of the 12, may lie in the plane itself.
+  // The ray crosses the plane in the box's middle, so the views see the further half of its points.
+  // There is one point per voxel of the 12; one of them may lie in the plane itself.
   EXPECT_NEAR(from_height(100.0), 0.5, 1.0 / 12.0);
   EXPECT_NEAR(from_height(-100.0), 0.5, 1.0 / 12.0);
 }
@@ -243,8 +243,7 @@ TEST(MeasuredResidual, RefusesSourcesThatAreOnNoCircle) {
   EXPECT_THAT(orbit_problems(views).at(0), HasSubstr("lie on a line"));
 }
 
-// --- the caster
-// -----------------------------------------------------------------------------------
+// ---- the caster ----
 
 /// Viewpoints about the first source, two slabs.
 LightSlab slab_before_first_view() {
@@ -310,7 +309,7 @@ TEST_F(CorrectedCaster, AddsAResidualThatIsTheSameEverywhereToEveryRayOfTheCt) {
   };
   int whole = 0;
   for (std::size_t node = 0; node < of_slab; ++node) {
-    // Where a slab has nothing it gets nothing, and its part is missing.
+    // A slab that holds nothing gets nothing, so its part would be missing.
     if (before[node] == 0 || before[node + of_slab] == 0) continue;
     ++whole;
     // Two levels are rounded anew.

@@ -99,7 +99,7 @@ TEST(ShearWarpFieldCaster, EllipsoidGivesMuTimesChordLength) {
       ++compared;
     }
     ASSERT_GT(compared, 2000);
-    // The mean has no such excuse: voxels of 27 samples keep the volume to well under 1 %.
+    // The mean must be much better: voxels of 27 samples keep the volume to well under 1 %.
     EXPECT_LT(std::abs(error_sum / compared), 0.002 * mu_per_mm(body.hu) * 40.0);
   }
 }

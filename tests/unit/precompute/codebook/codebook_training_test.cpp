@@ -233,7 +233,8 @@ TEST(CodebookTraining, RefusesMoreCodewordsThanDistinctTiles) {
 }
 
 TEST(CodebookTraining, KeepsTheSizeWhenTilesRunOut) {
-  // As many codewords as tiles: every tile becomes a codeword and nothing is left to repair with.
+  // There are as many codewords as tiles. So every tile becomes a codeword, and none is left for
+  // repairs.
   const TrainingShare share = dealt(training_tiles(40), 1).front();
   const int codewords = static_cast<int>(share.training.size()) + 1;
   const TrainedCodebook trained = train_serially(share, {.codewords = codewords, .seed = kSeed});
@@ -357,7 +358,8 @@ TEST(TileSelection, StaysWithinTheCap) {
     const TrainingShare share =
         test::select_training_tiles(field.tiles, field.units, field.lattice, {1.0, cap, 1});
     EXPECT_LE(share.training.size(), cap);
-    // One of 65536 steps short at most: far less than one tile here, but bins are not equally full.
+    // The cut is at most one of 65536 steps short, far less than one tile here. But bins are not
+    // equally full.
     EXPECT_GE(share.training.size(), cap * 9 / 10);
   }
 }

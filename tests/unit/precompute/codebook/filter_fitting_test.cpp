@@ -51,7 +51,7 @@ UnitTiles tiles_of(const WorkUnit& unit) {
   return make_unit_tiles(unit, samples);
 }
 
-/// Of a few codewords, so that much is lost.
+/// Has few codewords, so that much is lost.
 Codebook coarse_codebook(int mean_step) {
   TrainingShare share;
   const UnitTiles tiles = tiles_of(unit_of({0, kUv}, {0, kSt}));
@@ -85,7 +85,7 @@ FittedFilter fit_of(const Codebook& codebook, const std::vector<WorkUnit>& patch
   return sums.fit();
 }
 
-/// Over nodes that are not empty as decoded, of the third of tiles that are fitted.
+/// Sums over the third of the tiles that is fitted, without nodes that decode to empty.
 double squared_error_of(const CompressedAttenuationField& field) {
   const FieldLevel decoded =
       decode_field(std::make_shared<const CompressedAttenuationField>(field));
@@ -102,8 +102,8 @@ double squared_error_of(const CompressedAttenuationField& field) {
   return sum;
 }
 
-/// Fitted to a whole field, the errors that a fit states are those of the decoded field but for
-/// the rounding to levels, and no other weights have smaller ones.
+/// A fit to a whole field states the errors of the decoded field, up to rounding to levels. No
+/// other weights may have smaller ones.
 TEST(FilterFitting, IsTheLeastSquaredErrorOfTheDecodedField) {
   for (const int mean_step : {0, 32}) {
     Codebook codebook = coarse_codebook(mean_step);
@@ -125,14 +125,14 @@ TEST(FilterFitting, IsTheLeastSquaredErrorOfTheDecodedField) {
         float& weight =
             other.filter->weights[static_cast<std::size_t>(j)][static_cast<std::size_t>(i)];
         weight += change;
-        // The own weight of coefficient 0 follows from the others.
+        // The weight of coefficient 0 for itself follows from the others.
         if (j == 0) other.filter->weights[0][0] -= 2.0f * change;
         EXPECT_GT(squared_error_of(field_of(other)), least - rounding) << j << ' ' << i;
       }
   }
 }
 
-/// Patches that overlap by a tile on each side have every tile once, so they sum to the whole.
+/// Patches that overlap by a tile on each side count every tile once, so they sum to the whole.
 TEST(FilterFitting, DoesNotDependOnHowAFieldIsCutIntoPatches) {
   const Codebook codebook = coarse_codebook(32);
   const FittedFilter whole = fit_of(codebook, {unit_of({0, kUv}, {0, kSt})});
@@ -148,7 +148,7 @@ TEST(FilterFitting, DoesNotDependOnHowAFieldIsCutIntoPatches) {
   EXPECT_EQ(cut.squared_error, whole.squared_error);
 }
 
-/// Sixteen tiles for each weight of a coefficient: 528.
+/// A fit needs sixteen tiles for each weight of a coefficient: 528.
 TEST(FilterFitting, FitsNothingToTooFewTiles) {
   const Codebook codebook = coarse_codebook(32);
   WorkUnit patch = unit_of({0, kUv}, {4, 20});
@@ -212,7 +212,7 @@ TEST(FilterFitting, TakesPatchesFromWhatIsStored) {
   EXPECT_NE(nodes_of(filter_patches(lattice, 1)), nodes_of(filter_patches(lattice, 2)));
 }
 
-/// Else the tiles of small fields would count as many.
+/// Otherwise the tiles of small fields would count several times.
 TEST(FilterFitting, TakesEveryPlaceOnce) {
   FieldLattice lattice;
   lattice.slabs = {{{12, {0, 12}}, {14, {0, 14}}, {16, {0, 16}}, {32, {0, 32}}}};

@@ -17,7 +17,7 @@ namespace {
 constexpr int kMeanStep = 64;  ///< above 0: the search for folded shapes
 constexpr std::uint64_t kTileSeed = 7;
 
-/// Tiles as a field has them: a level, a slope along each axis, and noise; some faint, some flat.
+/// Tiles like a field's: a level, a slope along each axis, and noise; some faint, some flat.
 std::vector<Tile> field_like_tiles(std::size_t count, std::uint64_t stream, double level_scale) {
   std::vector<Tile> tiles(count);
   for (std::size_t i = 0; i < count; ++i) {

@@ -7,7 +7,7 @@
 
 namespace af::test {
 
-/// What a rank trains with that has cast all `units`.
+/// The training share of a rank that has cast all `units`.
 inline TrainingShare select_training_tiles(std::span<const UnitTiles> tiles,
                                            std::span<const WorkUnit> units,
                                            const FieldLattice& lattice,

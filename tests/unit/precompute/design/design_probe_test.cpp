@@ -39,7 +39,7 @@ CtVolume bones() {
 
 class DesignProbeTest : public testing::Test {
  protected:
-  /// A field of the design with `codewords`, or, with 0, one for every tile that occurs.
+  /// A field of the design with so many codewords. With 0, every tile that occurs is a codeword.
   std::shared_ptr<const CompressedAttenuationField> field_of(const FieldDesign& design,
                                                              int codewords) const {
     auto field = std::make_shared<CompressedAttenuationField>();
@@ -205,7 +205,8 @@ TEST_F(DesignProbeTest, CountsTheTilesOfTheField) {
   double occupied = 0.0;
   for (const CompressedSlab& slab : field->slabs)
     for (const std::uint16_t index : slab.indices.view()) occupied += index != 0 ? 1.0 : 0.0;
-  // Tiles coded by the zero codeword are few; three views tell the mean over all to some percent.
+  // Few tiles are coded by the zero codeword, so three views know the mean over all to some
+  // percent.
   constexpr double kShare = 0.06;
   EXPECT_NEAR(measured(design).occupied_tiles, occupied, kShare * occupied);
 }

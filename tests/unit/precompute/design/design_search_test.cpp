@@ -35,7 +35,7 @@ DesignForecast true_forecast(const FieldDesign& design) {
   return forecast;
 }
 
-/// Measures the imagined CT, and counts.
+/// Measures the imagined CT, and counts how often.
 class Measuring {
  public:
   MeasureDesign function() {
@@ -67,8 +67,8 @@ DesignBudget target(double psnr_db) {
   return budget;
 }
 
-/// What the last forecast may be off by: the model's laws over the small step from the last
-/// measured design to the chosen one.
+/// How far the last forecast may be off: by what the model's laws err over the small step from the
+/// last measured design to the chosen one.
 constexpr double kForecastDb = 0.3;
 constexpr double kForecastShare = 0.05;
 

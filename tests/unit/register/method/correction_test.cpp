@@ -100,9 +100,9 @@ PlainAndBetter plain_and_better(const test::SmallCase& small, const Registration
   return {plain, better};
 }
 
-/// X-rays are this ray caster's DRRs at the gold pose: that is its optimum for every measure.
-/// Gauss-Newton ends within a final step of 0.02 mm of it along each of six directions, which a
-/// motion along one view's beam, seen by the other alone, doubles.
+/// X-rays are this ray caster's DRRs at the gold pose, which is therefore its optimum for every
+/// measure. Gauss-Newton ends within a final step of 0.02 mm of it along each of six directions. A
+/// motion along one view's beam, seen by the other view alone, doubles that.
 constexpr double kGaussNewtonErrorMm = 2.0 * 2.45 * 0.02;
 
 TEST(Correction, OfAnImageThatStaysEndsBetterByEveryMeasureAndWhereRayCastingDoes) {
@@ -141,7 +141,7 @@ TEST(Correction, IsOfAnyOptimiserAndTheSearchThatItDoesByRayCasting) {
     options.correction.max_casts = 1000;
     const auto [plain, better] = plain_and_better(small, options);
     EXPECT_TRUE(better.correction->stood_still);
-    // Derivatives spare casts.
+    // Derivatives save casts.
     if (has_derivatives) {
       EXPECT_LE(better.correction->casts, 6);
       EXPECT_LT(distance_mm(small, better.room_from_ct, small.gold_room_from_ct),
@@ -193,7 +193,7 @@ TEST(Correction, OfAPortfolioCorrectsTheChosenEndAndJudgesIt) {
   const RegistrationResult result = registration.search(start_near_gold(small));
   EXPECT_LT(distance_mm(small, result.room_from_ct, small.gold_room_from_ct), kGaussNewtonErrorMm);
   EXPECT_EQ(result.similarity, registration.similarity_at(result.room_from_ct).similarity);
-  // It comes after all stages.
+  // The correction comes after all stages.
   EXPECT_EQ(result.trace.back().pass, 2);
 }
 

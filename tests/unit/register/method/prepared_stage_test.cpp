@@ -39,7 +39,7 @@ TEST(StageView, PixelsPerMmAreThoseOfProjectedLengths) {
   };
   const double columns = moved_px(camera.column_direction);
   const double rows = moved_px(camera.row_direction);
-  // Of spacings a and b: 2 / (a + b), the harmonic mean of 1 / a and 1 / b.
+  // For spacings a and b this is 2 / (a + b), the harmonic mean of 1 / a and 1 / b.
   EXPECT_NEAR(camera.pixels_per_mm(point), 2.0 / (1.0 / columns + 1.0 / rows), 1e-9);
 }
 
@@ -101,7 +101,7 @@ TEST(StageView, BlursByWhatTheMeansHaveNotBlurredYet) {
       square += weight * x * x;
     }
   const double variance = square / sum - std::pow(mean / sum, 2);
-  // Of the 4 px asked for, with the kernel cut at 4 sigma of a coarse grid.
+  // The stage asks for 4 px; the kernel is cut at 4 sigma on a coarse grid.
   EXPECT_NEAR(std::sqrt(variance), 4.0, 0.1);
 }
 

@@ -19,7 +19,7 @@ class FunctionTarget final : public registration::LeastSquaresTarget {
   using Nearest =
       std::function<registration::ScaledParameters(const registration::ScaledParameters&)>;
 
-  /// `nearest`: the known limits; none where there are none.
+  /// `nearest` clamps a point to the known limits; without it there are none.
   explicit FunctionTarget(Value value, Equations equations = {}, Nearest nearest = {})
       : value_(std::move(value)), equations_(std::move(equations)), nearest_(std::move(nearest)) {}
 

@@ -78,7 +78,8 @@ TEST_P(EveryOptimizer, FindsAQuadraticsMaximum) {
   test::FunctionTarget target = quadratic(4.0);
   const OptimizerResult result = search(GetParam(), target);
   EXPECT_EQ(result.stop_reason, StopReason::StepBelowFinal);
-  // Steps of the final length stand still within a few of them in each of six coupled parameters.
+  // Steps of the final length come to rest within a few such steps of the optimum in each of six
+  // coupled parameters.
   EXPECT_LT((result.point - quadratic_optimum()).norm(), 10.0 * kFinalStepMm);
   EXPECT_EQ(result.value, *target.evaluate(result.point));
   EXPECT_FALSE(result.trace.empty());
@@ -107,7 +108,7 @@ TEST_P(EveryOptimizer, SaysThatTheStartIsInadmissible) {
 }
 
 TEST_P(EveryOptimizer, NeverEndsAtAnInadmissiblePoint) {
-  // The optimum has length 6.6: it lies outside.
+  // The optimum has length 6.6, so it lies outside.
   constexpr double kLimit = 4.0;
   test::FunctionTarget target = quadratic(4.0, kLimit);
   const OptimizerResult result = search(GetParam(), target);
@@ -125,7 +126,7 @@ TEST_P(EveryOptimizer, SaysThatItIsPinnedAtAWall) {
   const OptimizerResult result = search(GetParam(), target);
   EXPECT_EQ(result.stop_reason, StopReason::PinnedAtLimit);
   EXPECT_EQ(result.point.cwiseMin(wall), result.point);
-  // As near as FindsAQuadraticsMaximum asks for: models end early at a cliff.
+  // Models end early at a cliff, so this asks no more than FindsAQuadraticsMaximum.
   EXPECT_GT(std::max(result.point[0], result.point[3]), kWall - 10.0 * kFinalStepMm);
 }
 
@@ -210,7 +211,7 @@ TEST(QuasiNewton, LearnsMissingCurvature) {
 }
 
 TEST(QuasiNewton, ForgetsWhatMadeAStepTooLong) {
-  // The curvature vanishes and comes back tenfold: what the first steps teach misleads.
+  // The curvature vanishes and comes back tenfold, so what the first steps teach misleads.
   const auto value = [](double x) {
     return x < 2.0 ? 0.05 * x : 0.1 - 5.0 * (x - 2.0) * (x - 2.0);
   };
@@ -233,7 +234,7 @@ TEST(QuasiNewton, ForgetsWhatMadeAStepTooLong) {
 }
 
 TEST(CurvatureBounds, KeepWhatIsWithin) {
-  // In directions that a shear makes oblique.
+  // A shear makes the directions oblique.
   ScaledMatrix shear = ScaledMatrix::Identity();
   shear(0, 1) = 0.7;
   shear(4, 2) = -0.4;
@@ -251,7 +252,7 @@ TEST(CurvatureBounds, KeepWhatIsWithin) {
   EXPECT_LT((found - sheared(scale.cwiseProduct(kept))).norm(), 1e-12 * found.norm());
   const ScaledMatrix upwards = -ScaledMatrix::Identity();
   EXPECT_EQ(kept_between(found, upwards, 0.1, 1.0), upwards);
-  // Of rank five, without a zero on its diagonal.
+  // This matrix has rank five, without a zero on its diagonal.
   ScaledMatrix flat = ScaledMatrix::Identity();
   flat(0, 1) = flat(1, 0) = 1.0;
   EXPECT_EQ(kept_between(found, flat, 0.1, 1.0), flat);
@@ -323,7 +324,7 @@ TEST(NewtonSearch, TakesTheStepForWhichNoBudgetIsLeft) {
 }
 
 TEST(NewtonSearch, TakesShorterStepsWhereValuesFall) {
-  // Steps of a curvature that is a fifth of the true one go too far.
+  // With a curvature of a fifth of the true one, steps go too far.
   test::FunctionTarget target = quadratic(1.0);
   OptimizerResult result;
   newton_search(target, 0.2 * curvature(1.0), newton_options(), {100, 1}, result);
@@ -337,7 +338,7 @@ TEST(MeasuredCurvature, IsThatOfAQuadraticAndBendsDownwardsWhereTheTargetDoesNot
   test::FunctionTarget target = quadratic(kCondition);
   const ScaledMatrix measured = measured_curvature(target, Derivatives::Gradient, 0.2);
   EXPECT_LT((measured - curvature(kCondition)).norm(), 1e-9 * curvature(kCondition).norm());
-  // The matrix stands for Gauss and Newton's curvature.
+  // The target's matrix plays the part of the Gauss-Newton curvature.
   ScaledMatrix saddle = ScaledMatrix::Identity();
   saddle(0, 0) = 0.25;
   saddle(2, 2) = -3.0;
@@ -350,7 +351,7 @@ TEST(MeasuredCurvature, IsThatOfAQuadraticAndBendsDownwardsWhereTheTargetDoesNot
   downwards(2, 2) = 2.0 * 0.03;
   downwards(4, 4) = 2.0;
   EXPECT_LT((measured_curvature(bent, Derivatives::NormalEquations, 0.2) - downwards).norm(), 1e-9);
-  // None is known to optimisers of gradients.
+  // Optimisers that use gradients alone know no such matrix.
   test::FunctionTarget only_gradient([](const ScaledParameters&) { return std::optional(0.0); },
                                      [&](const ScaledParameters& p) {
                                        return TargetValue{0.0, -saddle * p};

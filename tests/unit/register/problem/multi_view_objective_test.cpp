@@ -124,8 +124,8 @@ TEST(MultiViewObjective, PosesTogetherHaveTheValuesThatTheyHaveAlone) {
   }
 }
 
-/// Gives the tx of the pose that it remembers, which a pose 2 mm off replaces; rays are outside
-/// beyond 3 mm.
+/// Renders the tx of a remembered pose. A pose more than 2 mm away replaces that one, and rays are
+/// outside beyond 3 mm.
 class RememberingRenderer final : public DrrRenderer {
  public:
   explicit RememberingRenderer(std::chrono::milliseconds delay) : delay_(delay) {}
@@ -172,7 +172,7 @@ class FirstPixel final : public SimilarityMeasure {
   }
 };
 
-/// The first view's DRR comes last where threads share the views.
+/// Where threads share the views, the first view's DRR comes last.
 MultiViewObjective remembering_objective(int threads) {
   std::vector<ObjectiveView> views;
   for (int i = 0; i < 3; ++i) {
@@ -195,13 +195,13 @@ TEST(MultiViewObjective, ReusesImagesAlikeOnAnyNumberOfThreads) {
     objective.reuse_images(true);
     EXPECT_EQ(objective.evaluate(shifted(0.5)).similarity, 3 * 0.5);
     EXPECT_EQ(objective.evaluate(shifted(1.0)).similarity, 3 * 0.5);
-    // With threads the later views are rendered, too, before the first one refuses the pose.
+    // With threads, later views are rendered before the first one refuses the pose.
     EXPECT_FALSE(objective.evaluate(shifted(3.25)).is_admissible);
     EXPECT_EQ(objective.evaluate(shifted(1.5)).similarity, 3 * 1.5);
     EXPECT_EQ(objective.evaluate(shifted(2.0)).similarity, 3 * 1.5);
     const std::vector<RigidTransform> poses = {shifted(2.0), shifted(2.25)};
     std::vector<ObjectiveValue> values(poses.size());
-    objective.evaluate_all(poses, values);  // ends it
+    objective.evaluate_all(poses, values);  // ends the reuse
     EXPECT_EQ(values[0].similarity, 3 * 2.0);
     EXPECT_EQ(values[1].similarity, 3 * 2.25);
     EXPECT_EQ(objective.evaluate(shifted(1.0)).similarity, 3 * 1.0);

@@ -33,8 +33,8 @@ bool is_in_roi(const View& view, const Eigen::Vector3d& room_point) {
          pixel.y() < view.roi.row + view.roi.height - 0.5;
 }
 
-/// Displacements on the isocentre plane, mm, measured on the detector, of every seen point in every
-/// view after a small motion.
+/// Displacements of every seen point in every view after a small motion, mm. They are measured on
+/// the detector and scaled to the isocentre plane.
 std::vector<double> brute_force_displacements_mm(const std::vector<Eigen::Vector3d>& points,
                                                  const std::vector<View>& views,
                                                  const PoseVector& motion) {
@@ -101,7 +101,7 @@ TEST(ProjectedMotionBasis, MakesMotionsOfOneMillimetre) {
              kStep;
     };
     for (int i = 0; i < 6; ++i) EXPECT_NEAR(measured_mm(PoseVector::Unit(i)), 1.0, kSecondOrder);
-    // Independently of each other.
+    // Motions must not depend on each other.
     for (int i = 0; i < 6; ++i)
       for (int j = 0; j < i; ++j)
         EXPECT_NEAR(measured_mm(PoseVector::Unit(i) + PoseVector::Unit(j)),
@@ -153,7 +153,8 @@ TEST(ParameterScaling, OfAPointAtTheIsocentreIsOneForTranslationsAcrossTheBeam) 
   ASSERT_TRUE(scaling.has_value());
   EXPECT_NEAR(scaling->displacement_mm[3], 1.0, 1e-12);
   EXPECT_NEAR(scaling->displacement_mm[5], 1.0, 1e-12);
-  // Along the beam, and about itself, it does not move at all; its step stays finite.
+  // The point does not move in the image along the beam, nor when turned about itself. Its step
+  // must stay finite.
   EXPECT_EQ(scaling->displacement_mm[4], 1e-3);
   EXPECT_EQ(scaling->displacement_mm[0], 1e-3);
 }

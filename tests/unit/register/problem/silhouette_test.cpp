@@ -64,7 +64,7 @@ TEST(Silhouette, RegionHoldsAllUsedPixels) {
   EXPECT_EQ(whole.pixel_count(), 200u);
 }
 
-/// The X-rays of bones in a corner, and over them a second body that moves by itself: bright edges
+/// X-rays of bones in a corner, overlaid by a second body that moves by itself. It has bright edges
 /// everywhere but on the bones.
 test::SmallCase bones_among_others() {
   test::SmallCase small = test::small_case(test::bones_in_a_corner());

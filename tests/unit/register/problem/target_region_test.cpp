@@ -43,7 +43,7 @@ TEST(TargetRegion, HoldsTheBoxAndKeepsTheMarginsOfTheStatedRegion) {
   ASSERT_TRUE(box.has_value());
   EXPECT_LT((box->low_px - Eigen::Vector2d(15.5, 15.5)).norm(), 1e-9);
   EXPECT_LT((box->high_px - Eigen::Vector2d(31.5, 31.5)).norm(), 1e-9);
-  // Half a pixel's edge from the next one, so that rounding decides nothing.
+  // Off the pixels' edges, so that rounding decides nothing.
   const ProjectedBox exact{{15.6, 15.6}, {31.4, 31.4}};
   EXPECT_EQ(target_region_about(exact, RegionOfInterest{6, 7, 36, 30}, true),
             (RegionOfInterest{6, 7, 36, 30}));

@@ -34,7 +34,7 @@ RunDescription some_run() {
   return run;
 }
 
-/// A record as record_of(), with a confidence that says whether it is found.
+/// A record like that of record_of(), with a confidence that says whether it is found.
 RegistrationRecord judged_record(std::int64_t start_index, double similarity, double confidence) {
   RegistrationRecord record = record_of(start_index, similarity);
   record.view_values = {{0.8, 0.8}, {0.8, 0.8}};
@@ -56,7 +56,7 @@ TEST(ResultFiles, WhatIsNotFoundHasNoPoseThatAScriptCouldTake) {
   nlohmann::json json = result_json(judged_record(0, 1.5, 0.995), *small.problem, some_run());
   EXPECT_EQ(json.at("verdict"), "found");
   EXPECT_EQ(json.at("views").at("verdict"), "no fault found");
-  // What an earlier run found goes.
+  // What an earlier run found must go.
   write_result_files(judged_record(0, 1.5, 0.0), *small.problem, some_run(), folder.path());
   for (const char* name : {"pose.toml", "result.tfm"})
     EXPECT_FALSE(std::filesystem::exists(folder / name)) << name;
@@ -67,7 +67,7 @@ TEST(ResultFiles, WhatIsNotFoundHasNoPoseThatAScriptCouldTake) {
   EXPECT_FALSE(json.at("verdict_reason").get<std::string>().empty());
   EXPECT_TRUE(json.contains("rejected_room_from_ct"));
   EXPECT_FALSE(json.contains("room_from_ct"));
-  // And back.
+  // The reverse must hold as well.
   write_result_files(judged_record(0, 1.5, 0.995), *small.problem, some_run(), folder.path());
   EXPECT_TRUE(std::filesystem::exists(folder / "result.tfm"));
   EXPECT_FALSE(std::filesystem::exists(folder / "rejected-pose.toml"));
@@ -164,7 +164,7 @@ TEST(ResultFiles, ARunOfSeveralStartsLeavesATableAndTheBestResult) {
   EXPECT_NE(summary.find("highest similarity: start 1"), std::string::npos) << summary;
   EXPECT_EQ(CsvTable::read(folder / "registrations.csv").row_count(), 2U);
   EXPECT_NE(read_text_file(folder / "result.json").find("\"start_index\": 1"), std::string::npos);
-  // Verdict and probability are one sentence, and the only one that speaks of either.
+  // Verdict and probability share one sentence, and no other sentence mentions either.
   const std::string found =
       write_run({judged_record(0, 1.0, 0.995)}, *small.problem, some_run(), folder.path());
   EXPECT_EQ(found.find("verdict     found: right with 99.5 % (TRE below 2.5 mm), "), 0U) << found;

@@ -40,7 +40,7 @@ TEST(PoseSearch, FindsAPoseAnywhereInItsRange) {
     const std::vector<PoseMode> modes = search.modes();
     ASSERT_FALSE(modes.empty());
     // Half a step of rotations about each axis moves points of this CT, 30 mm from its middle, by
-    // up to 5 mm; half a step of the lattice adds 2 mm an axis.
+    // up to 5 mm. Half a step of the lattice adds 2 mm along each axis.
     EXPECT_LT(distance_mm(small, modes.front().room_from_ct), 8.0) << i;
     EXPECT_GT(modes.front().likeness, 0.5) << i;
   }
@@ -83,7 +83,7 @@ TEST(PoseSearch, OneViewFindsWhatItShows) {
 }
 
 TEST(PoseSearch, FindsAPoseFarAlongABeamThroughASmallRegionAndAMask) {
-  // The region lies off the coarse grid; the sizes of what a view shows change over the range.
+  // The region lies off the coarse grid, and the sizes of what a view shows change over the range.
   test::SmallCase small = small_case_at(PoseParameters::from_deg_and_mm({5, -4, 6, 6, 28, -7}));
   for (RegistrationView& view : small.problem->views) view.view.roi = {9, 11, 27, 25};
   RegistrationView& masked = small.problem->views[0];
@@ -185,7 +185,7 @@ TEST(PoseSearch, RefusesPosesThatAFieldDoesNotHold) {
   options.orientations = "field";
   options.rotation_deg = {12.0, 5.0, 5.0};
   EXPECT_THAT(refusal(*small.problem, options), HasSubstr("+-10 degrees, +-20 mm"));
-  // A field whose nominal pose lies 30 mm aside holds less of the first one's range.
+  // A field whose nominal pose lies 30 mm aside holds less of the first field's range.
   PoseFrame aside = small.problem->frame();
   aside.center_room_mm.x() += 30.0;
   small.problem->views[1].reach = MotionLimit{aside, MotionRange(10.0 * kRadPerDeg, 20.0)};

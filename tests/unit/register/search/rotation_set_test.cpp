@@ -34,8 +34,8 @@ TEST(RotationSet, EveryRotationOfARangeHasOneNearby) {
   HashRandom random(1);
   for (int i = 0; i < 200; ++i) {
     const PoseParameters pose = random_pose(range, random);
-    // Half a step about each of three axes, which are not orthogonal when turned: at most their
-    // sum.
+    // Half a step about each of three axes. Turned axes are not orthogonal, so the sum is the
+    // bound.
     EXPECT_LT(nearest_rad(rotations, rotation_from_angles(pose.rotation_rad)), 1.5 * step);
   }
 }
@@ -54,8 +54,8 @@ TEST(RotationSet, EveryRotationHasOneNearby) {
     farthest = std::max(
         farthest, nearest_rad(rotations, Eigen::Quaterniond(q.normalized()).toRotationMatrix()));
   }
-  // Half the diagonal of a cell of the grid; between two of the cube's rotations cells are cut, so
-  // that their middles may be missing: up to half a step more.
+  // Half the diagonal of a cell of the grid. Between two of the cube's rotations cells are cut, and
+  // their middles may be missing: up to half a step more.
   EXPECT_LT(farthest, (0.5 * std::numbers::sqrt3 + 0.5) * step);
   EXPECT_GT(farthest, 0.5 * step);
 }

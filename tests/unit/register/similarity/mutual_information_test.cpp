@@ -42,7 +42,7 @@ double mutual_information(const SimilarityReference& reference,
   return measure.evaluate(drr, *workspace);
 }
 
-/// The definition, with probabilities: an independent way to the same number.
+/// The definition by probabilities, an independent way to the same number.
 double mutual_information_by_definition(const Image2d& xray,
                                         const ValueRange& xray_range,
                                         const std::vector<float>& drr,
@@ -112,7 +112,7 @@ TEST(MutualInformation, EqualsTheDefinitionOnNoise) {
   std::vector<float> drr(xray.pixels.size());
   for (std::size_t i = 0; i < drr.size(); ++i) drr[i] = 0.7f * xray.pixels[i] + other.pixels[i];
   const auto [low, high] = std::minmax_element(xray.pixels.begin(), xray.pixels.end());
-  // A DRR range narrower than its values: what lies beyond counts in the outer bins.
+  // The range is narrower than the DRR's values. What lies beyond counts in the outer bins.
   const ValueRange drr_range{1.0, 6.0};
   for (const int bins : {2, 13, 64, 256}) {
     const double expected = mutual_information_by_definition(
@@ -179,7 +179,7 @@ TEST(MutualInformation, StaysDefinedForADrrThatIsNotFinite) {
   drr[1] = static_cast<float>(infinity);
   drr[2] = static_cast<float>(-infinity);
   const double with_bad_values = mutual_information(reference, drr);
-  // NaN and below count in the first bin, above in the last.
+  // NaN and values below the range count in the first bin, values above it in the last.
   drr[0] = drr[2] = 0.0f;
   drr[1] = 4.0f;
   EXPECT_EQ(with_bad_values, mutual_information(reference, drr));

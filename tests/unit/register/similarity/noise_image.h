@@ -8,7 +8,7 @@
 
 namespace af::test {
 
-/// Pixels from 0 to 4, each drawn by itself.
+/// Pixels drawn independently from 0 to 4.
 inline Image2d noise_image(int width, int height, std::uint64_t seed) {
   Image2d image(width, height);
   HashRandom random(seed);

@@ -98,7 +98,7 @@ TEST_P(EveryMeasure, GivesTheSameBitsOnEveryVectorWidth) {
   force_vector_width(std::nullopt);
 }
 
-/// The measure by what it can do; nullptr when it cannot.
+/// The measure as the interface `Measure`; nullptr when it does not implement that.
 template <typename Measure>
 std::shared_ptr<const Measure> made_as(const SimilarityOptions& options,
                                        const SimilarityReference& reference) {
@@ -153,8 +153,8 @@ TEST_P(EveryMeasure, HasTheDerivativeOfItsValueByEveryPixel) {
   EXPECT_NEAR(measure->evaluate_with_derivative(drr, derivative, *workspace),
               measure->evaluate(drr, *workspace),
               kRounding);
-  // Along random directions: many pixels at once, so that the rounding of single precision stays
-  // small beside the difference.
+  // Random directions change many pixels at once, so that single-precision rounding stays small
+  // beside the difference.
   HashRandom random(11);
   for (int trial = 0; trial < 5; ++trial) {
     std::vector<float> direction(drr.size());
@@ -175,8 +175,8 @@ TEST_P(EveryMeasure, HasTheDerivativeOfItsValueByEveryPixel) {
     const double difference =
         (measure->evaluate(up, *workspace) - measure->evaluate(down, *workspace)) /
         (2.0 * static_cast<double>(step));
-    // Third derivatives over the step, and the robust gain's few steps, which do not quite
-    // converge.
+    // Two errors remain: third derivatives over the step, and the robust gain's few steps, which do
+    // not quite converge.
     constexpr double kShare = 0.01;
     EXPECT_NEAR(expected, difference, kShare * scale + 1e-3 * std::abs(difference));
   }
@@ -228,7 +228,7 @@ TEST(SimilarityMeasures, GainAndOffsetDoNotCountWhereTheyAreEliminated) {
     EXPECT_NEAR(
         similarity(name, reference, mapped(moved, 1.7f, 0.4f)),
         similarity(name, reference, moved.pixels),
-        // A histogram's or a median's few pixels on a border may change sides.
+        // A few pixels on a border of a histogram's bin or at a median may change sides.
         std::string(name) == "entropy" || std::string(name) == "go" ? 0.02 : kSimilarityRounding)
         << name;
 }
@@ -249,8 +249,8 @@ TEST(SimilarityMeasures, NothingToCompareIsWorthNothing) {
   EXPECT_NEAR(similarity("nmi", reference, flat), 1.0, kSimilarityRounding);
 }
 
-/// Where no derivative leads up, the second derivatives are those of the value, with the gain
-/// eliminated, along planes that change the DRR linearly.
+/// Along planes with zero slope, which change the DRR linearly, the difference of both matrices is
+/// made of the second derivatives of the value, with the gain eliminated.
 TEST(RobustGradient, CurvesLessThanItsNormalEquationsByTheReweighting) {
   Image2d xray = blobs();
   HashRandom random(8);

@@ -24,7 +24,7 @@ PoseVector drawn(std::mt19937_64& random) {
   return vector;
 }
 
-/// Least squares y = A p + e, whose errors are equal within blocks of rows: what one tile shares.
+/// Least squares y = A p + e, whose errors are equal within blocks of rows, as within one tile.
 struct BlockProblem {
   static constexpr int kBlocks = 60;
   static constexpr int kRowsPerBlock = 5;
@@ -43,7 +43,7 @@ struct BlockProblem {
           .setConstant(sigma[static_cast<std::size_t>(block)] * normal(random));
     return result;
   }
-  /// Of -|y - A p|^2 / 2, where the estimate leaves `residuals`.
+  /// What -|y - A p|^2 / 2 says about p where the estimate leaves `residuals`.
   [[nodiscard]] PoseInformation information(const Eigen::VectorXd& residuals) const {
     PoseInformation information;
     information.curvature = design.transpose() * design;
@@ -205,7 +205,7 @@ TEST(Calibration, WidensWhatThePoseDoesNotExplain) {
   const std::vector<ViewValue> hidden_bone{{0.4, 0.3, true}, {0.4, 0.3, true}};
   EXPECT_GT(covariance_inflation("gc", bone).pose, 1.0);
   EXPECT_GT(covariance_inflation("gc", hidden_bone).pose, covariance_inflation("gc", bone).pose);
-  // Over silhouettes no other measure was fitted.
+  // Within silhouettes the constants were fitted to one measure only.
   EXPECT_EQ(covariance_inflation("rg", bone).pose, covariance_inflation("ssd", bone).pose);
   EXPECT_TRUE(std::isnan(covariance_inflation("rg", {}).pose));
   EXPECT_TRUE(std::isnan(covariance_inflation("rg", {}).tre));
@@ -219,7 +219,7 @@ TEST(Calibration, CoarserSamplesShiftImagesMore) {
   EXPECT_LT(interpolation_shift_mm(1.0), 0.1);
 }
 
-// One view has constants of its own: its covariance is one of two views only by name.
+// One view has constants of its own. Its covariance is not comparable to that of two views.
 TEST(Calibration, WidensOneViewByItsOwnConstants) {
   for (const char* similarity : {"rg", "gc", "mi"}) {
     double last = 0.0;
@@ -236,7 +236,8 @@ TEST(Calibration, WidensOneViewByItsOwnConstants) {
   }
 }
 
-// A right place of one view explains what poses beside it do not; of a wrong one they explain half.
+// At a right place one view explains what poses beside it do not. At a wrong one they explain half
+// of it.
 TEST(Calibration, ConfidenceOfOneViewLooksAtWhatPosesBesideExplain) {
   const auto confidence = [](double fine, double background) {
     return success_confidence({std::vector<ViewValue>{{0.8, fine, false, background}}, 30.0});
@@ -248,7 +249,7 @@ TEST(Calibration, ConfidenceOfOneViewLooksAtWhatPosesBesideExplain) {
   EXPECT_LT(confidence(0.3, 0.29), 0.1);
   EXPECT_LT(confidence(0.3, 0.35), 0.1) << "poses beside it explain more";
   EXPECT_TRUE(std::isnan(confidence(0.3, std::nan(""))));
-  // Depth is not what is asked.
+  // With one view the confidence does not ask about depth.
   const std::vector<ViewValue> values = {{0.8, 0.3, false, 0.1}};
   EXPECT_EQ(success_confidence({values, 0.1}), success_confidence({values, std::nan("")}));
 }
@@ -258,7 +259,7 @@ TEST(Calibration, ConfidenceWithinSilhouettesFallsWithEveryDoubt) {
     const std::vector<ViewValue> values = {{0.8, fine_a, true, 0.05}, {0.8, fine_b, true, 0.05}};
     return success_confidence({values, tre_mm});
   };
-  // As drawn bones end, and those of a real wrist (docs/howto/bones.md).
+  // Values of drawn bones and of a real wrist (docs/howto/bones.md).
   EXPECT_GT(confidence(0.80, 0.75, 0.2), 0.99);
   EXPECT_GT(confidence(0.42, 0.44, 0.1), 0.9);
   EXPECT_LT(confidence(0.80, 0.75, 2.0), 0.5);

@@ -29,8 +29,9 @@ double mean_distance_mm(const RigidTransform& a, const RigidTransform& b) {
 }
 
 /// The search ends within about one final step (0.1 mm of mean projected motion) of the optimum in
-/// each of its six parameters, and half of them at random signs: sqrt(6) steps, doubled because a
-/// step is a mean over two views and a motion along one view's beam shows in the other only.
+/// each of its six parameters. With random signs these add up to sqrt(6) steps. That is doubled,
+/// because a step is a mean over two views and a motion along one view's beam shows only in the
+/// other.
 constexpr double kFinalStepErrorMm = 2.0 * 2.45 * 0.1;
 
 RigidTransform start_near(const test::SmallCase& small) {
@@ -118,7 +119,7 @@ TEST(Registration, RepeatsAndThreadsGiveTheSameBits) {
   }
 }
 
-/// Leaves every view the rays of the nominal pose alone.
+/// Leaves every view only the rays of the nominal pose.
 void keep_rays_of_nominal(const RegistrationProblem& problem,
                           std::vector<RegistrationView>& views) {
   for (RegistrationView& view : views)
@@ -324,7 +325,7 @@ TEST(Registration, DrawnSearchesDependOnSeedAndStartIndexAlone) {
   EXPECT_NE(other.search(start_near(small), 3).room_from_ct.matrix(), first.room_from_ct.matrix());
 }
 
-/// With steps so small that it ends where it began.
+/// A chain with steps so small that it ends where it began.
 ChainOptions idle_chain(ChainOptions chain) {
   chain.name = "idle";
   for (StageOptions& stage : chain.stages) stage.search = {1e-6, 1e-6, 16};
@@ -345,7 +346,7 @@ TEST(Registration, APortfolioTakesTheChainThatItsJudgePrefers) {
   EXPECT_EQ(result.chain, "good");
   EXPECT_LT(mean_distance_mm(result.room_from_ct, small.gold_room_from_ct), kFinalStepErrorMm);
   EXPECT_EQ(result.similarity, registration.similarity_at(result.room_from_ct).similarity);
-  // An end that explains nothing is said to.
+  // The stop reason says when an end explains nothing.
   options.judge.least_value = 2.0;
   EXPECT_EQ(Registration(small.problem, options).search(start_near(small)).stop_reason,
             StopReason::NoBetterThanNoDrr);
@@ -366,7 +367,7 @@ TEST(Registration, APortfolioEndsAtTheFirstConvincingChain) {
   Registration all(small.problem, options);
   const RegistrationResult both = all.search(start_near(small));
   EXPECT_EQ(both.evaluations, 2 * alone);
-  // Just convincing, and just not: the value at the end itself is enough.
+  // Just convincing, and just not. A value equal to that of the end is enough.
   for (const bool is_convincing : {true, false}) {
     options.judge.enough_value = both.similarity + (is_convincing ? 0.0 : 1e-9);
     Registration registration(small.problem, options);
@@ -391,7 +392,7 @@ TEST(Registration, ALastResortRunsOnlyWhereNothingWasFound) {
   };
   const RegistrationResult idle_alone = result_below(-1.0);
   EXPECT_EQ(idle_alone.chain, "idle");
-  // Just called, and just not.
+  // The last resort is just called, and just not.
   EXPECT_EQ(result_below(idle_alone.similarity + 1e-9).chain, "resort");
   EXPECT_EQ(result_below(idle_alone.similarity).chain, "idle");
 }
@@ -483,7 +484,7 @@ TEST(Registration, TheFinishChoosesAmongEndsThatTheJudgeHardlyTellsApart) {
   }
 }
 
-/// Everything but the seconds.
+/// Compares everything but the seconds.
 void expect_same(const RegistrationResult& a, const RegistrationResult& b) {
   EXPECT_EQ(a.room_from_ct.matrix(), b.room_from_ct.matrix());
   EXPECT_EQ(a.similarity, b.similarity);

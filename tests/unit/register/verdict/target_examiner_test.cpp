@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The target asked by itself: bones of which one has moved against the others in the X-rays.
+// The target examined alone: in the X-rays one bone has moved against the others.
 #include "register/verdict/target_examiner.h"
 
 #include <cmath>
@@ -21,7 +21,7 @@ using test::five_ellipsoids;
 using test::small_case;
 using test::SmallCase;
 
-/// About the second ellipsoid of five_ellipsoids(), of which it holds all.
+/// Holds all of the second ellipsoid of five_ellipsoids().
 const CtBox kTarget{{1, -16, -6}, {23, 0, 26}};
 
 std::shared_ptr<const DrrRenderer> cast_of_target() {
@@ -81,13 +81,13 @@ TEST(TargetExaminer, SaysTheSameWhateverItWasAskedBefore) {
   EXPECT_EQ(of_near.share, alone.share);
   EXPECT_EQ(of_near.apart_mm, alone.apart_mm);
   EXPECT_NE(of_far.share, alone.share);
-  // How far it is apart is of the pose itself, not of the lattice's.
+  // How far the target is apart is measured from the pose itself, not from the lattice's.
   EXPECT_NEAR(of_gold.apart_mm - of_near.apart_mm, 0.01, 0.002);
 }
 
 TEST(TargetExaminer, SaysNothingWhereTheTargetCannotBeAsked) {
-  const auto is_silent = [](const SmallCase& of) {
-    const TargetEvidence evidence = TargetExaminer(of.problem).evidence(of.gold_room_from_ct);
+  const auto is_silent = [](const SmallCase& made) {
+    const TargetEvidence evidence = TargetExaminer(made.problem).evidence(made.gold_room_from_ct);
     return std::isnan(evidence.share) && std::isnan(evidence.apart_mm);
   };
   SmallCase without_ct = case_with(RigidTransform::Identity());

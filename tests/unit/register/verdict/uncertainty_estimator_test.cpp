@@ -293,8 +293,8 @@ TEST(UncertaintyEstimator, TakesRobustGradientsWhereAMeasureHasNoDerivative) {
   const UncertaintyReport report =
       estimator.report(result, std::vector<ViewValue>{{0.9, 0.9, false, 0.15}});
   EXPECT_TRUE(std::isfinite(report.covariance_deg_mm[0]));
-  // What the X-rays explain moves the confidence, whatever the calibration makes of this small
-  // case.
+  // How much of the X-rays is explained moves the confidence, whatever the calibration makes of
+  // this small case.
   const UncertaintyReport worse =
       estimator.report(result, std::vector<ViewValue>{{0.3, 0.15, false, 0.15}});
   EXPECT_GT(worse.confidence, 0.0);
@@ -329,7 +329,7 @@ TEST(UncertaintyEstimator, CalibratesTresByThemselves) {
   EXPECT_TRUE(std::isnan(report.depth_95_mm)) << "two views show depth";
 }
 
-// What all starts share: residuals do not show it, so it is added, whatever the pose explains.
+// All starts share this shift, so residuals do not show it. It is added whatever the pose explains.
 TEST(UncertaintyEstimator, AddsWhatInterpolationShifts) {
   const test::SmallCase small = test::small_case();
   const auto problem = std::make_shared<RegistrationProblem>(*small.problem);
@@ -356,7 +356,8 @@ TEST(UncertaintyEstimator, AddsWhatInterpolationShifts) {
   const PoseMatrix stated = from_deg_mm(none.covariance_deg_mm);
   const PoseMatrix by_fine = from_deg_mm(fine.covariance_deg_mm) - stated;
   EXPECT_TRUE((from_deg_mm(coarse.covariance_deg_mm) - stated).isApprox(4.0 * by_fine, 1e-6));
-  // A calibration that shifts images as much does the same: pixels of 3 mm, at 650 of 1000 mm.
+  // A calibration error that shifts images as much does the same. Pixels are 3 mm, at 650 of 1000
+  // mm.
   const double as_much_px = interpolation_shift_mm(1.0) / (3.0 * 0.65);
   EXPECT_TRUE((from_deg_mm(at_spacing(0.0, as_much_px).covariance_deg_mm) - stated)
                   .isApprox(by_fine, 1e-6));
@@ -378,7 +379,8 @@ TEST(UncertaintyEstimator, SaysNothingWhereNoViewCanBeJudged) {
   EXPECT_TRUE(std::isnan(report.tre_95_mm));
 }
 
-/// What is said of the gold pose by gradient correlation; `silhouette_mm`: 0 for the whole region.
+/// The report on the gold pose by gradient correlation. A `silhouette_mm` of 0 takes the whole
+/// region.
 UncertaintyReport report_at_gold(const test::SmallCase& small,
                                  double silhouette_mm,
                                  int pixel_step = 1) {

@@ -46,7 +46,8 @@ TEST(Judgement, FollowsTheConfidenceAlone) {
                                                             {0.0499, Verdict::NotFound},
                                                             {0.0, Verdict::NotFound},
                                                             {std::nan(""), Verdict::Doubtful}};
-  // Whatever the X-rays show of the pose: little of it under stress, or in a coarse field.
+  // How much the X-rays show of the pose must not matter: under stress, or in a coarse field, it is
+  // little.
   for (const auto& [confidence, verdict] : expected)
     for (const ViewValue value : {ViewValue{0.9, 0.9}, ViewValue{0.15, 0.05}})
       EXPECT_EQ(verdict_of(record_with(confidence, {value, value})), verdict) << confidence;
@@ -58,7 +59,7 @@ TEST(Judgement, SaysTheProbabilityAndWhatWasWanted) {
   };
   EXPECT_EQ(reason(0.9968), "right with 99.6 % (TRE below 2.5 mm), at least 99.0 % wanted");
   EXPECT_EQ(reason(1.0), "right with 99.9 % (TRE below 2.5 mm), at least 99.0 % wanted");
-  // Rounded down: 99.0 % would be found.
+  // Percentages are rounded down, since 99.0 % would be found.
   EXPECT_EQ(reason(0.98999), "right with 98.9 % (TRE below 2.5 mm), at least 99.0 % wanted");
   EXPECT_EQ(reason(0.012), "right with 1.2 % (TRE below 2.5 mm), at least 5.0 % wanted");
   EXPECT_EQ(
@@ -71,14 +72,14 @@ TEST(Judgement, AnEndElsewhereThatIsAsAlikeLeavesADoubt) {
   const test::SmallCase small = test::small_case();
   const auto ended = [](double explained, double x_mm) {
     RegistrationRecord record = record_with(0.9968, {{explained, 0.9}, {explained, 0.9}});
-    record.result.similarity = 1.0 + explained;  // as of a measure that is never 0
+    record.result.similarity = 1.0 + explained;  // like a measure that is never 0
     record.result.room_from_ct.translation().x() = x_mm;
     return record;
   };
   RegistrationRecord record = ended(0.8, 0.0);
   RegistrationRecord not_found = ended(0.8, 50.0);
   not_found.uncertainty.confidence = 0.01;
-  // The same place, an end that is none, and two places elsewhere.
+  // An end at the same place and one that is not found are no rivals; an end elsewhere is.
   set_rival(*small.problem, {record, ended(0.79, 3.0), not_found}, record);
   EXPECT_FALSE(record.rival.has_value());
   set_rival(*small.problem, {record, ended(0.6, 60.0), ended(0.68, 30.0)}, record);
@@ -123,11 +124,10 @@ TEST(Judgement, TheBestRecordIsFoundAndMostAlike) {
     records.back().result.similarity = similarity;
     records.back().start_index = static_cast<std::int64_t>(records.size());
   }
-  EXPECT_EQ(best_record(records), 2u) << "one that is not found is worse, the first of equal ones "
-                                         "is better";
+  EXPECT_EQ(best_record(records), 2u) << "not found is worse; of equals the first is better";
 }
 
-// Without it the confidence is a lower bound.
+// Without a predicted TRE the confidence is a lower bound.
 TEST(Judgement, WithoutAPredictedTreRejectsNothing) {
   RegistrationRecord record = record_with(0.012);
   record.uncertainty.tre_rms_mm = std::nan("");
@@ -157,7 +157,7 @@ TEST(Judgement, ATargetThatDisagreesWithItsSurroundingsIsDoubtful) {
     EXPECT_EQ(verdict_of(record), Verdict::Doubtful) << explained;
   }
   EXPECT_EQ(verdict_of(record_of(0.9968, {0.04, 0.0})), Verdict::Doubtful);
-  EXPECT_EQ(verdict_of(record_of(0.9968, {})), Verdict::Found) << "it was not asked";
+  EXPECT_EQ(verdict_of(record_of(0.9968, {})), Verdict::Found) << "the target was not asked";
   EXPECT_EQ(
       judgement_of(record_of(0.9968, {0.7, 3.42})).reason,
       "the target disagrees with its surroundings: by itself it fits 3.5 mm from here; it may "
@@ -174,7 +174,7 @@ TEST(Judgement, AnAgreeingTargetDoublesTheOdds) {
   EXPECT_TRUE(agrees_with_surroundings({0.7, 0.2}, values));
   EXPECT_FALSE(agrees_with_surroundings({0.7, 0.4}, values));
   EXPECT_FALSE(agrees_with_surroundings({0.04, 0.0}, values));
-  EXPECT_FALSE(agrees_with_surroundings({}, values)) << "it was not asked";
+  EXPECT_FALSE(agrees_with_surroundings({}, values)) << "the target was not asked";
 }
 
 TEST(Judgement, OfOneViewSaysWhatIsNotKnown) {
@@ -223,17 +223,17 @@ TEST(Judgement, SaysWhereTheRangeEndsAndWhereTheStartWasClipped) {
   const std::string ends =
       "the field's range ends here along rx, rz, tx: the optimum may lie outside";
   EXPECT_EQ(judgement_of(record).reason, ends + "; but for that " + probability);
-  // What a diagnosis finds does not replace it.
+  // The messages of a diagnosis do not replace that reason.
   record.diagnosis.messages = {"view 'B' does not agree"};
   EXPECT_EQ(judgement_of(record).reason,
             "view 'B' does not agree; " + ends + "; but for that " + probability);
-  // Where the probability leaves the doubt, it comes first.
+  // Where the probability causes the doubt, it comes first.
   record.uncertainty.confidence = 0.5;
   EXPECT_EQ(judgement_of(record).reason.find("right with 50.0 % "), 0U);
   record.uncertainty.confidence = 0.9951;
   EXPECT_EQ(verdict_of(record), Verdict::Doubtful);
   record.result = RegistrationResult();
-  EXPECT_EQ(verdict_of(record), Verdict::Doubtful) << "what a diagnosis finds is enough";
+  EXPECT_EQ(verdict_of(record), Verdict::Doubtful) << "the message of a diagnosis is enough";
   record = record_with(0.9951);
   record.result.clipped_along = "ry";
   EXPECT_EQ(verdict_of(record), Verdict::Found);
@@ -360,7 +360,7 @@ std::vector<ViewValue> values_at_gold(const test::SmallCase& small) {
   return PoseExaminer(small.problem, 0.0).view_values(small.gold_room_from_ct);
 }
 
-/// A case whose X-rays `harm` changed, its nominal pose beside the gold one.
+/// A case that `harm` has changed, with its nominal pose beside the gold one.
 test::SmallCase harmed_case(const std::function<void(RegistrationProblem&)>& harm) {
   test::SmallCase small = case_with_levels();
   small.problem->nominal_room_from_ct = beside_gold(small, 1.0);
@@ -482,7 +482,7 @@ TEST(ViewDiagnoser, TriesChangesOncePerCase) {
   EXPECT_GT(after, before);
   ASSERT_EQ(said_of_worse.size(), 1U);
   EXPECT_NE(said_of_worse[0].find("'LAT' turned by 180 degrees"), std::string::npos);
-  // Of every end it says what it would have said of it first.
+  // The diagnosis of an end does not depend on the ends examined before it.
   const std::vector<std::string> said_of_gold = diagnoser.diagnosis(at_gold).messages;
   EXPECT_EQ(counted->drrs, after);
   EXPECT_EQ(said_of_gold, ViewDiagnoser(small.problem).diagnosis(at_gold).messages);
