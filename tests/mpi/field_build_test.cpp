@@ -361,7 +361,7 @@ TEST_F(FieldBuildTest, ProgressOfRefusedOptionsGivesWayToOthersAndIsUsedByTheSam
   UnitStore(work_in(progress_path), world_).give_way();
   world_.barrier();
   EXPECT_GT(units_found("3"), 0u);
-  EXPECT_THROW(units_found("4"), Error);  // it is no longer given up
+  EXPECT_THROW(units_found("4"), Error);  // it has been taken again
   world_.barrier();
   UnitStore(work_in(progress_path), world_).give_way();
   world_.barrier();
