@@ -4,9 +4,9 @@
 #
 #   precompute_program.sh AF_PRECOMPUTE MPIEXEC SECTION [sanitized]
 #
-# SECTION: refusals, spacing, ranks, budget, memory, corrections or stops, a function below. sanitized: the program was
-# compiled with a sanitizer, which takes memory and time of its own. Its memory is not judged, its limit is larger, and it
-# runs on at most 4 ranks.
+# SECTION: refusals, spacing, ranks, budget, memory, corrections or stops, a function below.
+# sanitized: the program was compiled with a sanitizer, which takes memory and time of its own. Its memory is not judged,
+# its limit is larger, and it runs on at most 4 ranks.
 set -euo pipefail
 
 # shellcheck source=tests/programs/body_ct.sh
