@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""X-rays of one bone among others and a study of it, for what is measured of `--preset bone` (docs/howto/bones.md): the CT holds one
-bone in air (numbers 0 to 4095), two cameras (MayaCam files) also see other bones and soft tissue. X-rays are cast through bodies of
-half the CT's voxels, so that they share none. Needs numpy, af-drr and af-convert beside it."""
+"""Makes X-rays of one bone among others and a study of it, to measure `--preset bone` (docs/howto/bones.md). The CT
+holds one bone in air (numbers 0 to 4095). Two cameras (MayaCam files) also see other bones and soft tissue. X-rays are
+cast through bodies of half the CT's voxels, so that they share none. Needs numpy, af-drr and af-convert beside it."""
 import argparse
 import pathlib
 import struct

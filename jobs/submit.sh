@@ -100,7 +100,7 @@ submit() {
     return
   fi
   printf '%s\n' "$commands" >"$output/jobs/$stage.commands"
-  job_id=$("${command[@]}") || die 1 "sbatch refused stage '$stage' (see above); what stands before it in the chain is submitted"
+  job_id=$("${command[@]}") || die 1 "sbatch refused stage '$stage' (see above); the stages before it are submitted"
   job_id=${job_id%%;*}
   echo "$job_id $stage" >>"$output/jobs/submitted"
   say "$stage: job $job_id"

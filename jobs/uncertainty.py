@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Whether registrations know their own errors: fits the constants of register/verdict/calibration.cpp to the
-registrations of a population study (jobs/population.sh, jobs/bones.sh), whose truth is known, on the patients of odd
-numbers, and prints how well they do on the others; with --folds to all drawn patients, each judged by constants that
-patients of other folds gave. Patients that were not drawn, which have no number, are never fitted. Needs nothing but
-Python."""
+"""Whether registrations know their own errors. Fits the constants of register/verdict/calibration.cpp to the
+registrations of population studies (jobs/population.sh, jobs/bones.sh), whose truth is known. It fits them to the
+patients of odd numbers, and prints how well they do on the others. With --folds it fits them to all drawn patients, and
+judges each by constants from patients of other folds. Patients that were not drawn have no number, and are never
+fitted. Needs nothing but Python."""
 import argparse
 import csv
 import hashlib
@@ -24,7 +24,7 @@ LEAST_SHARE = 0.05
 LEAST_EXCESS = 0.02
 
 
-# What is read of a table of registrations.
+# The columns that are read from a table of registrations.
 COLUMNS = ["case", "tre_mm", "mrpd_mm", "judge_fine_mean", "judge_excess", "covariance_inflation", "tre_inflation", "squared_distance",
            "sandwich_tre_mm", "predicted_tre_95_mm", "confidence"]
 
@@ -116,8 +116,9 @@ def case_weights(rows):
 
 
 def fit_inflation(rows, squares, least):
-    """Quantile regression (Koenker and Bassett 1978) of the logarithms of squares, which 95 % should not exceed by the
-    sandwich estimate alone, on the shortfall of what the pose explains, so that 95 % lie inside."""
+    """Fits by quantile regression (Koenker and Bassett 1978), so that 95 % of the registrations lie inside. It
+    regresses the logarithms of `squares`, which 95 % should not exceed by the sandwich estimate alone, on the shortfall
+    of what the pose explains."""
     y = [math.log(max(square, 1e-6)) for square in squares]
     x = [row.shortfall() for row in rows]
     weights = case_weights(rows)

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Whether verdicts and predicted errors are true: prints them against the truth for the registrations of population
-studies (jobs/population.sh), counted by X-ray pair (a case of one variant, with its views and preset). Verdicts of right
-and of wrong ends, with bones that have moved apart from rigid patients; and how often the predicted TRE holds. Needs
-nothing but Python."""
+"""Whether verdicts and predicted errors are true. Compares them with the truth for the registrations of population
+studies (jobs/population.sh), counted by X-ray pair (a case of one variant, with its views and preset). Prints the
+verdicts of right and of wrong ends, with moved bones apart from rigid patients, and how often the predicted TRE holds.
+Needs nothing but Python."""
 import argparse
 import math
 import pathlib

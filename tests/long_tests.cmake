@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-# What `tests/run.sh --fast` leaves out: these get the label `long`. A name is that of a program of tests, of a CTest entry, of
-# several that begin with it and a dot, or of one TEST. Without them, physics, and MPI on more than two ranks, the seconds of all
-# others in Testing/Temporary/CTestCostData.txt add up to less than 300.
+# `tests/run.sh --fast` leaves out these tests, which get the label `long`. A name stands for a program of tests, a CTest
+# entry, all entries that begin with it and a dot, or one TEST. Without them, physics, and MPI on more than two ranks, the
+# seconds of all others in Testing/Temporary/CTestCostData.txt add up to less than 300.
 set(af_long_tests
     # Programs of tests, and CTest entries
     Pages atlas_program bad_inputs bones checks.scripts convert.mutations convert.program evaluate_program_tests

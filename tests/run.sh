@@ -50,7 +50,7 @@ build_preset "$preset" "$af_root/build/$preset.log"
 say "        $(duration $((SECONDS - build_start)))"
 
 export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
-# In a chroot without /sys hwloc complains on standard error of every program, amid what the tests read there.
+# In a chroot without /sys, hwloc complains on standard error of every program, which the tests read.
 export HWLOC_HIDE_ERRORS="${HWLOC_HIDE_ERRORS:-2}"
 keep_folder_of_mpirun
 # A rank that waits would spin on a processor that another test needs.
@@ -62,11 +62,11 @@ if [[ "$preset" == sanitize ]]; then
   ctest_options+=(--label-exclude checks)
 fi
 if [[ "$preset" == sanitize-threads ]]; then
-  # Open MPI and HDF5 are not compiled for the sanitizer: it ignores what they do by themselves. Physics tests have no
+  # Open MPI and HDF5 are not compiled for the sanitizer, so it ignores what they do by themselves. Physics tests have no
   # threads.
   export TSAN_OPTIONS="halt_on_error=1:ignore_noninstrumented_modules=1"
   ctest_options+=(--label-exclude 'checks|physics')
 fi
 cd "$af_root/build/$preset"
-# The longest tests start and stop programs, and wait for much of their time: one more than there are processors.
+# One test more than there are processors, because the longest tests mostly wait for programs to start and stop.
 exec ctest --output-on-failure --no-tests=error --parallel "$(($(core_count) + 1))" "${ctest_options[@]}"

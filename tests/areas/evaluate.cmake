@@ -43,7 +43,7 @@ af_add_program_tests(
   LABELS programs mpi
   TIMEOUT 600)
 
-# Of all programs: whoever builds these tests has every library of options.
+# The options of all programs are tested here, because these tests link every library of options anyway.
 af_add_test(
   described_options_test
   SOURCES unit/described_options_test.cpp

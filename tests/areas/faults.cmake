@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# Jobs that die.
+# Tests of jobs that die.
 af_add_program_tests(
   kill_matrix_tests PREPARED
   SOURCES programs/kill_matrix_test.cpp support/launched_job.cpp

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# The shared library and the Python module against what the programs make of a small study.
+# Compares the shared library and the Python module with what the programs make of a small study.
 set(af_library_study ${CMAKE_CURRENT_BINARY_DIR}/library_study)
 add_executable(make_library_study library/make_library_study.cpp)
 target_link_libraries(make_library_study PRIVATE af_compile_options af_test_support af_register)

@@ -17,6 +17,6 @@ foreach(page ${af_pages})
                                         ${af_page_data})
     set_tests_properties(Pages.${name} PROPERTIES LABELS programs TIMEOUT 300 FIXTURES_REQUIRED page_data)
   endif()
-  # A page may get its first command, or lose its last.
+  # A page may get its first command, or lose its last, so a change of a page configures anew.
   set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${page})
 endforeach()

@@ -20,7 +20,7 @@ af_add_test(
           unit/register/results/registration_results_test.cpp unit/register/results/slicer_folder_test.cpp
   LIBS af_register)
 af_add_mpi_test(register_mpi_tests SOURCES mpi/multi_start_test.cpp LIBS af_register RANKS 1 2 3 4)
-# Its own operator new belongs into a file of its own.
+# Its operator new must not be compiled together with other sources.
 set_source_files_properties(support/counted_allocations.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 af_add_test(
   allocation_test

@@ -29,8 +29,9 @@ struct Timing {
   [[nodiscard]] double minimum() const;
 };
 
-/// Runs every contender once per round, each round beginning with the next one, so that a machine
-/// that slows down slows all of them. A round before the first warms caches and does not count.
+/// Runs every contender once per round. Each round begins with the next contender, so that a
+/// machine that slows down slows all of them. A round that warms the caches comes first and does
+/// not count.
 std::vector<Timing> alternate(const std::vector<Contender>& contenders, int rounds);
 
 /// {name: {work, unit, seconds: {median, min, max, rounds}, per_second (by the median)}}
@@ -39,7 +40,7 @@ nlohmann::json to_json(const std::vector<Timing>& timings);
 /// How many times faster per unit of work `fast` is than `slow`, by the medians and by the minima.
 nlohmann::json speed_ratio(const Timing& fast, const Timing& slow);
 
-/// The timing of that name; nullptr when that contender was not there.
+/// The timing of that name; nullptr when there was no such contender.
 const Timing* find(const std::vector<Timing>& timings, const std::string& name);
 
 double median_of(std::vector<double> values);

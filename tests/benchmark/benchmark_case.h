@@ -17,7 +17,7 @@
 
 namespace af::benchmark {
 
-/// What every benchmark program is told.
+/// The options that every benchmark program has.
 struct CaseOptions {
   std::string ct;
   std::string rig = "c-arm-12in";
@@ -32,7 +32,7 @@ struct CaseOptions {
 void bind_case(CLI::App& app, CaseOptions& options);
 
 /// A CT and a camera, and the field geometry that af-precompute would choose for them. The CT is
-/// brought to identity direction, because ITK's caster and plastimatch's want it so.
+/// brought to identity direction, because the casters of ITK and plastimatch need it.
 class BenchmarkCase {
  public:
   explicit BenchmarkCase(const CaseOptions& options);
@@ -46,7 +46,7 @@ class BenchmarkCase {
   [[nodiscard]] std::vector<WorkUnit> units() const;  ///< as one rank would cast them
   /// The CT and the camera.
   [[nodiscard]] nlohmann::json description() const;
-  /// These, and the field geometry.
+  /// The same, and the field geometry.
   [[nodiscard]] nlohmann::json description_with_field() const;
 
  private:
@@ -58,7 +58,7 @@ class BenchmarkCase {
   LightSlab light_slab_;
 };
 
-/// `count` of the values, evenly spread.
+/// Picks `count` of the values, evenly spread.
 template <typename Value>
 std::vector<Value> evenly_spread(const std::vector<Value>& values, std::size_t count) {
   std::vector<Value> spread;

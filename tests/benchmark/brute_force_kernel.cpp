@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Exact nearest codeword by comparing every tile with every codeword, as fast as that plainly goes:
-// 16 codewords to a vector, four tiles share every load, differences before squares so that floats
-// are nearly exact, a fused multiply-add where the width has one. Compiled once per vector width.
+// Exact nearest codeword by comparing every tile with every codeword, as fast as this plain method
+// allows: 16 codewords to a vector, four tiles to every load, and a fused multiply-add where the
+// width has one. Differences come before squares, so that floats are nearly exact. Compiled once
+// per vector width.
 #include "benchmark/brute_force_kernel.h"
 
 #include "base/processor.h"
@@ -30,11 +31,12 @@ AF_KERNEL_INLINE uint64_t exact_error(const uint16_t* a, const uint16_t* b) {
 
 struct Nearest {
   uint64_t error;
-  float limit;  ///< above every float sum of a codeword that could be as near
+  float limit;  ///< a codeword with a larger float sum is surely farther
   uint32_t index;
 };
 
-/// Floats decide only what is surely farther. Ties take the lowest index.
+/// Floats only rule out what is surely farther; integers decide the rest. Ties take the lowest
+/// index.
 AF_KERNEL_INLINE void offer_block(const benchmark::BruteForceCodebook& codebook,
                                   uint32_t block,
                                   const uint16_t* tile,
@@ -51,7 +53,7 @@ AF_KERNEL_INLINE void offer_block(const benchmark::BruteForceCodebook& codebook,
   }
 }
 
-/// `tiles` are kTilesAtOnce; those past the last repeat it.
+/// There are always kTilesAtOnce `tiles`; places past the last tile repeat it.
 AF_KERNEL_INLINE void search_together(const benchmark::BruteForceCodebook& codebook,
                                       const uint16_t* const (&tiles)[kTilesAtOnce],
                                       Nearest (&nearest)[kTilesAtOnce]) {

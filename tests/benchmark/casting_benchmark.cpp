@@ -36,7 +36,8 @@ std::size_t rays_of(const std::vector<WorkUnit>& units) {
       });
 }
 
-/// The unit about the middle of the field, where rays meet the CT: a corner's would be for free.
+/// The unit in the middle of the field, whose rays meet the CT. Those of a corner may miss it and
+/// cost nothing.
 WorkUnit middle_unit(const std::vector<WorkUnit>& units) {
   const auto middle_of = [](const NodeRange& range) { return range.begin + range.end(); };
   std::array<int, 4> last{};
@@ -66,8 +67,8 @@ Contender field_contender(const char* name,
           }};
 }
 
-/// How much two images of the same rays agree when one may have another unit: the factor and the
-/// PSNR. NumericError when they are not the same image: then a comparison of times means nothing.
+/// How well two images of the same rays agree: the factor between their units, and the PSNR. Throws
+/// NumericError when they show different things, because comparing times would then mean nothing.
 nlohmann::json agreement(const std::vector<float>& image, const std::vector<float>& reference) {
   double product = 0.0;
   double square = 0.0;
@@ -87,7 +88,7 @@ nlohmann::json agreement(const std::vector<float>& image, const std::vector<floa
   return {{"factor", factor}, {"psnr_db", quality->psnr_db}};
 }
 
-/// Seconds, rays and tiles of every unit of the field on one core: what a model of balance needs.
+/// Seconds, rays and tiles of every unit of the field on one core, for a model of load balance.
 nlohmann::json measure_units(const FieldCaster& caster, const std::vector<WorkUnit>& units) {
   nlohmann::json measured = nlohmann::json::array();
   std::vector<std::uint16_t> samples;
@@ -178,7 +179,7 @@ void run(const CaseOptions& options, const std::string& work_folder) {
 
 }  // namespace af::benchmark
 
-// Only what CLI11 throws while the options are bound: a defect.
+// Outside app_main only the declaration of options can throw, and that would be a defect.
 // NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
   af::benchmark::CaseOptions options;

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Mean line integrals of a noisy CT for several --air-below-hu: the table of docs/cts.md.
+"""Prints mean line integrals of a noisy CT for several --air-below-hu, for the table of docs/cts.md.
 
 Usage: ct_noise_bias.py BIN_FOLDER, such as build/release/bin. Takes about a minute.
 

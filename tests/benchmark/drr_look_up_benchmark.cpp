@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Seconds of one DRR looked up in a field, one core, beside casting it through the CT.
+// Seconds of one DRR on one core: looked up in a field, and cast through the CT.
 #include <functional>
 
 #include <CLI/CLI.hpp>
@@ -39,7 +39,7 @@ std::vector<RigidTransform> random_poses(const CompressedAttenuationField& field
 using Draw = std::function<void(
     const RigidTransform& pose, RenderWorkspace& workspace, std::span<float> planes)>;
 
-/// The poses that all contenders see, and how often in one run.
+/// The poses that all contenders draw, and how often each is drawn in one run.
 struct Series {
   const std::vector<RigidTransform>& poses;
   int repetitions;
@@ -130,7 +130,7 @@ void run(const LookUpOptions& of_look_up, const Communicator& world) {
   const std::vector<RigidTransform> poses = random_poses(*field, options.is_quick ? 2 : 20);
   const std::vector<RigidTransform> few_poses = evenly_spread(poses, 2);
   const auto samples = std::make_shared<const FieldLevel>(decode_field(field));
-  // With a filter, every look-up is in decoded samples: all share these.
+  // With a filter, every look-up reads decoded samples, so all share these.
   const bool has_filter = field->codebook.filter.has_value();
   const auto renderer = [&](const TwoPassOptions& look_up, int threads = 1) {
     auto pool = std::make_shared<ThreadPool>(threads);
@@ -206,7 +206,7 @@ void run(const LookUpOptions& of_look_up, const Communicator& world) {
 
 }  // namespace af::benchmark
 
-// Only what CLI11 throws while the options are bound: a defect.
+// Outside app_main only the declaration of options can throw, and that would be a defect.
 // NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
   af::benchmark::LookUpOptions options;

@@ -49,7 +49,7 @@ Job paper_job(bool is_quick) {
   return design("paper", "paper", is_quick ? kLittleTraining : std::vector<std::string>{});
 }
 
-/// The default design, the paper's, and what single choices change of the paper's.
+/// The default design, the paper's, and the paper's with single choices changed.
 std::vector<Job> field_jobs(bool is_quick) {
   if (is_quick) return {design("standard", "standard", kLittleTraining), paper_job(true)};
   return {design("standard", "standard"),
@@ -119,7 +119,8 @@ WatchedRun run_or_throw(const std::vector<std::string>& command,
   return run;
 }
 
-/// Cold: no earlier result, the CT not in the page cache. The program itself and its libraries are.
+/// A cold start: there is no earlier result, and the CT is not in the page cache. The program and
+/// its libraries are.
 WatchedRun build_field(const FieldOptions& options, const Job& job, WatchMemory watch_memory) {
   const fs::path field = field_path(options, job);
   fs::remove(field);
@@ -135,7 +136,7 @@ nlohmann::json inspected(const FieldOptions& options, const Job& job) {
   return nlohmann::json::parse(run.output).at(0).at("facts");
 }
 
-/// The file's facts that tables need, and the seconds per phase that the program wrote into it.
+/// What the tables say of the file, and the seconds per phase that the program wrote into it.
 nlohmann::json facts_of(const nlohmann::json& inspection) {
   const nlohmann::json& details = inspection.at("provenance").at("details");
   return {{"file_mb", inspection.at("sizes").at("file_mb")},
@@ -149,7 +150,8 @@ nlohmann::json facts_of(const nlohmann::json& inspection) {
           {"rays_cast", details.at("rays_cast")}};
 }
 
-/// Seconds per phase: from the file, and of writing, which the file cannot hold, from the log.
+/// Seconds per phase, from the file. Those of writing come from the log, because the file cannot
+/// hold them.
 nlohmann::json phases_of(const nlohmann::json& inspection, const fs::path& log) {
   nlohmann::json phases = inspection.at("provenance").at("details").at("seconds");
   std::ifstream file(log);
@@ -261,7 +263,7 @@ void run(const FieldOptions& options) {
 
 }  // namespace af::benchmark
 
-// Only what CLI11 throws while the options are bound: a defect.
+// Outside app_main only the declaration of options can throw, and that would be a defect.
 // NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
   af::benchmark::FieldOptions options;

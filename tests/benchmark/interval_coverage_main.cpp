@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How often the intervals of docs/errors.md hold the truth: its table.
+// Prints the tables of docs/errors.md that say how often its intervals hold the truth.
 #include <cstdio>
 
 #include <CLI/CLI.hpp>
@@ -85,7 +85,7 @@ void print_equivalence(const SimulatedStudies& setting) {
 
 }  // namespace
 
-// Binding options can throw only by a defect, which may well end the program.
+// Only a defect in the declaration of options can throw here, and it may end the program.
 // NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
   SimulatedStudies setting;

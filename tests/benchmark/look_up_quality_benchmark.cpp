@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the ways of looking DRRs up are worth without the codebook's loss, and how well their
-// gradients agree with ray casting's.
+// How good each way of looking up DRRs is without the codebook's loss, and how well its gradients
+// agree with ray casting's.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -223,7 +223,7 @@ void run(const CaseOptions& options, const std::string& field_path, const Commun
 
 }  // namespace
 
-// Binding options can throw only by a defect, which may well end the program.
+// Only a defect in the declaration of options can throw here, and it may end the program.
 // NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
   CaseOptions options;

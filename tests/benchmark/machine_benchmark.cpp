@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What one core of this machine can do at most: reading from each level of the memory, the
-// arithmetic of the casters and of the codeword search. A profile holds phases against these.
+// The most that one core of this machine can do: reading from each level of the memory, and the
+// arithmetic of the casters and of the codeword search. A profile compares phases with these
+// bounds.
 #include <CLI/CLI.hpp>
 
 #include "base/vector_width.h"
@@ -29,8 +30,8 @@ std::vector<std::int32_t> some_values(std::size_t count) {
   return values;
 }
 
-/// A contender that runs `loop` over the first `count` values; results go where nobody can drop
-/// them.
+/// A contender that runs `loop` over the first `count` values. It keeps the results, so that the
+/// compiler cannot drop the work.
 Contender loop_contender(const std::string& name,
                          MachineLoop loop,
                          const std::vector<std::int32_t>& values,
@@ -109,7 +110,7 @@ void run(const MachineOptions& options) {
 
 }  // namespace af::benchmark
 
-// Only what CLI11 throws while the options are bound: a defect.
+// Outside app_main only the declaration of options can throw, and that would be a defect.
 // NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
   af::benchmark::MachineOptions options;

@@ -65,8 +65,8 @@ int32_t squared_differences(const int32_t* values, size_t count, size_t repetiti
 }
 
 int32_t gather_all(const int32_t* values, size_t count, size_t repetitions) {
-  // Lanes a prime number of values apart, as samples of neighbouring rays are; `count` is a power
-  // of two of at least 4096.
+  // Lanes lie a prime number of values apart, as scattered as samples of neighbouring rays. `count`
+  // is a power of two of at least 4096.
   const Ints16 lanes = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
   const int32_t stride = 67;
   Ints16 sum = {};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Loops that do one kind of thing as fast as a core can: the bounds that the phases of a field are
-// held against.
+// Loops that do one kind of work as fast as a core can. They bound what the phases of a field can
+// reach.
 #pragma once
 
 #include <stddef.h>

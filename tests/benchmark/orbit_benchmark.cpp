@@ -31,7 +31,7 @@ struct StudyOptions {
   std::string camera = "AP";
   int slabs = 4;
   double slab_mm = 0.0;      ///< thickness, alike in all frames; 0: where they suit the CT best
-  double uv_step_mm = 22.0;  ///< of the atlas whose samples all get
+  double uv_step_mm = 22.0;  ///< of the atlas; others get as many samples
   double st_step_mm = 0.9;
   int poses = 20;     ///< at each angle
   int pairs = 40000;  ///< of neighbouring samples
@@ -183,8 +183,8 @@ class Contender {
   virtual void set_viewpoints(double step_mm) = 0;
   [[nodiscard]] virtual double samples(double st_step_mm) const = 0;
   [[nodiscard]] virtual int viewpoints() const = 0;
-  /// By how much a sample differs from that of the next viewpoint along the orbit, at a random
-  /// (s,t) node of a random slab: what tiles of two of them have to code.
+  /// How much a sample differs from that of the next viewpoint along the orbit, at a random (s,t)
+  /// node of a random slab. A tile of two viewpoints has to code this.
   [[nodiscard]] virtual double difference_along_orbit(HashRandom& random,
                                                       const RayCaster& caster) const = 0;
   /// Of a DRR's rays (ct frame).
@@ -367,7 +367,7 @@ class Cylinder final : public Contender {
   std::vector<GridAxis> v_;
 };
 
-/// Brings a contender to about so many samples; gives the distance of its viewpoints.
+/// Brings a contender to about this many samples, and returns the distance between its viewpoints.
 double spend(Contender& contender, double samples, double st_step_mm) {
   double low = 5.0;
   double high = 100.0;
@@ -522,7 +522,7 @@ void run(const StudyOptions& options) {
 
 }  // namespace
 
-// Binding options can throw only by a defect, which may well end the program.
+// Only a defect in the declaration of options can throw here, and it may end the program.
 // NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
   StudyOptions options;

@@ -18,8 +18,8 @@ namespace {
 
 constexpr double kToleranceMm = 1e-6;
 
-/// Gantry angle in radians (plastimatch's degrees are not): 0 has the source at +x, pi / 2 at -y.
-/// nullopt when the camera is no gantry.
+/// Gantry angle in radians, which plastimatch takes although it calls them degrees. At 0 the source
+/// is at +x, at pi / 2 at -y. nullopt when the camera is no gantry.
 std::optional<double> gantry_angle_rad(const CameraGeometry& camera,
                                        const Eigen::Vector3d& center) {
   const Eigen::Vector3d source = camera.source_point - center;
@@ -45,8 +45,8 @@ double seconds_after(const std::string& output, const std::string& key) {
   return sum;
 }
 
-/// The CT as the attenuation that our casters see: plastimatch's own rule from HU leaves much of a
-/// lung out, and it has less to do without one.
+/// The CT as the attenuation that our casters see: plastimatch's own conversion from HU drops much
+/// of a lung, and without it plastimatch has less to do.
 CtVolume relative_attenuation_of(const BenchmarkCase& benchmark_case) {
   const CtVolume& ct = benchmark_case.ct();
   const AttenuationModel& model = benchmark_case.volume()->model();

@@ -11,13 +11,13 @@
 namespace af::benchmark {
 
 /// `plastimatch drr`, exact mode (Siddon), one thread, on the case's CT and camera at the nominal
-/// pose. Its own clock counts: "Total time" less "I/O time", which leaves out reading the CT, over
-/// several equal DRRs of one call.
+/// pose. Its own clock counts, over several equal DRRs of one call: "Total time" less "I/O time",
+/// which leaves out reading the CT.
 class PlastimatchDrr {
  public:
-  /// nullopt when plastimatch is not installed or the camera is none that its gantry can take (one
-  /// that turns about z, aims at the isocentre and has it at its centre). Writes the CT's
-  /// attenuation into `folder`.
+  /// nullopt when plastimatch is not installed or its gantry cannot take the camera, which must
+  /// turn about z, aim at the isocentre and have it at its centre. Writes the CT's attenuation into
+  /// `folder`.
   static std::optional<PlastimatchDrr> prepare(const BenchmarkCase& benchmark_case,
                                                const std::filesystem::path& folder,
                                                int drrs_per_call);

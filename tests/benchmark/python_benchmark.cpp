@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a DRR costs more from Python than by the library's call, and that more than the renderer's
-// own: the same field object, one process, one core, in turns.
+// How much more a DRR costs from Python than by the library's call, and by that call than by the
+// renderer itself. All take turns on the same field object, in one process on one core.
 #include <pybind11/embed.h>
 #include <pybind11/numpy.h>
 
@@ -19,7 +19,7 @@ namespace py = pybind11;
 
 struct PythonOptions {
   std::string field;
-  /// Many short ones: what else the machine does then disturbs few of them.
+  /// Many short ones, so that other work on the machine disturbs few of them.
   int rounds = 301;
   bool is_quick = false;
   std::string output;
@@ -115,7 +115,7 @@ void run(const PythonOptions& options) {
                   }},
                  {"Python drr_and_gradient()", work, "DRRs", python("gradient")}},
                 options.is_quick ? 1 : options.rounds);
-  // How many times faster the library's call is: what Python costs.
+  // The ratio says what Python costs.
   const nlohmann::json ratios = {speed_ratio(timings[0], timings[1]),
                                  speed_ratio(timings[0], timings[2]),
                                  speed_ratio(timings[3], timings[4])};
@@ -131,7 +131,7 @@ void run(const PythonOptions& options) {
 }  // namespace
 }  // namespace af::benchmark
 
-// Only what CLI11 throws while the options are bound: a defect.
+// Outside app_main only the declaration of options can throw, and that would be a defect.
 // NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
   af::benchmark::PythonOptions options;

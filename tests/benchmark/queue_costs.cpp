@@ -39,7 +39,7 @@ RegistrationRow some_row(std::int64_t index) {
   return row;
 }
 
-/// Results of as many items would travel in one message, were they sent to rank 0.
+/// If results were sent to rank 0, one message would carry those of this many items.
 constexpr int kMostCollectedPerBlock = 64;
 
 /// Rank 0's side of one request; seconds from seeing it to having answered it.
@@ -93,7 +93,7 @@ void measure_rows(int repetitions, QueueCosts& costs) {
   const ProgressJournal journal({folder.path(), "case", {}});
   ProgressShard on_rank_zero(journal.files(), {0, 0});
   ProgressShard own(journal.files(), {0, 1});
-  // Medians over rounds: now and then the disk takes its time.
+  // Medians over rounds, because now and then the disk is slow.
   constexpr int kRows = 500;
   std::vector<RegistrationRow> kept(kRows);
   std::vector<double> receive_seconds;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What rank 0 of a work queue spends, measured.
+// Measures the time that rank 0 of a work queue spends.
 #pragma once
 
 #include "benchmark/scale_simulation.h"
@@ -7,14 +7,14 @@
 
 namespace af::benchmark {
 
-/// Collective, two ranks or more. Rank 0's time for a request from seeing it to having answered it,
-/// and per row that comes with it in blocks of 64; measured between ranks 0 and 1, as
-/// ranks/work_queue.cpp does it. On rank 0 only.
+/// Collective, on two ranks or more; only rank 0 has the result. Measures rank 0's time for a
+/// request, from seeing it to having answered it, and per row that comes with it in blocks of 64.
+/// Ranks 0 and 1 talk as in ranks/work_queue.cpp.
 void measure_messages(const Communicator& world, int repetitions, QueueCosts& costs);
 
-/// What becomes of a row of registrations: packing and appending to the rank's own shard, as
-/// af-evaluate does it (write_seconds), or, were all rows sent to rank 0, unpacking, packing and
-/// appending there (receive_seconds).
+/// Times what happens to a row of registrations. write_seconds: the rank packs it and appends it to
+/// its own shard, as af-evaluate does. receive_seconds: if all rows were sent to rank 0, it would
+/// unpack, pack and append them.
 void measure_rows(int repetitions, QueueCosts& costs);
 
 }  // namespace af::benchmark

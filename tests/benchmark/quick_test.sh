@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# The benchmarks with little work: every section writes what the report needs. The programs themselves fail when fast
-# and plain searches differ or casters see different images. Usage: quick_test.sh BUILD-FOLDER CT
+# Runs the benchmarks with little work, and checks that every section writes what the report needs. The programs themselves
+# fail when fast and plain searches differ or casters see different images. Usage: quick_test.sh BUILD-FOLDER CT
 set -euo pipefail
 programs=$1 ct=$2
 scratch=$(mktemp -d)

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Joins the sections of a benchmark: benchmark.json with what a model of scaling needs, tables (.md), and a number a line (.csv).
+"""Joins the sections of a benchmark: benchmark.json with what a model of scaling needs, tables (.md), and one number per line (.csv).
 
 Usage: report.py FOLDER COMMIT COMMAND      FOLDER holds sections/*.json"""
 import csv
@@ -69,12 +69,12 @@ def phases(jobs, title):
 
 
 def fields(sections):
-    def of(section, name):
+    def job_named(section, name):
         return next((job for job in sections.get(section, {}).get("jobs", []) if job["name"] == name), None)
 
     rows = []
     for job in sections["fields"]["jobs"]:
-        memory, quality = of("memory", job["name"]), of("quality", job["name"])
+        memory, quality = job_named("memory", job["name"]), job_named("quality", job["name"])
         rows.append([job["name"], number(job["seconds"]["median"]), number(memory["peak_node_mb"], ".0f") if memory else "", number(job["file_mb"]),
                      number(job["payload_mb"]), *(number(quality["psnr_db"][which], ".1f") if quality else "" for which in ("median", "p5", "min"))])
     return table("Whole fields, 2 ranks", ["field", "s", "peak MB", "file MB", "payload MB", "median dB", "5 % dB", "least dB"], rows) + "\n" + phases(

@@ -78,7 +78,7 @@ fi
 
 # One BLAS thread, because all numbers are per core.
 export OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
-# Faiss gets OpenBLAS's best kernels: Debian's takes AVX2 kernels on processors newer than itself.
+# Debian's OpenBLAS takes AVX2 kernels on processors newer than itself. Faiss must get the best ones.
 unset OPENBLAS_CORETYPE OPENBLAS_L2_SIZE
 if grep -q avx512vl /proc/cpuinfo 2>/dev/null; then
   export OPENBLAS_CORETYPE=SkylakeX

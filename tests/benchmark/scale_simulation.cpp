@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::uint64_t kHostStream = 1;
 constexpr std::uint64_t kItemStream = 2;
-constexpr double kRequestBytes = 8.0 + 16.0;  // that it stands, and the answer
+constexpr double kRequestBytes = 8.0 + 16.0;  // the request, and the answer
 
 /// A request of a rank with the rows of its last block, on its way to rank 0.
 struct Request {
@@ -73,8 +73,8 @@ class Simulation {
     return queue_.rows == RowsGo::ToRankZero ? costs_.row_bytes : 0.0;
   }
 
-  /// What a rank that got `items` at `time` does: compute, write its rows where they are its own,
-  /// ask again.
+  /// A rank that got `items` at `time` computes, writes its rows if it keeps them itself, and asks
+  /// again.
   void start(int rank, double time, std::int64_t items, double way_seconds) {
     double end = time + work(rank, items);
     if (queue_.rows == RowsGo::ToOwnShard) end += static_cast<double>(items) * costs_.write_seconds;
@@ -109,8 +109,8 @@ class Simulation {
       start(request.rank, granted + costs_.latency_seconds, items, costs_.latency_seconds);
   }
 
-  /// Rank 0 answers first, then looks at the rows; one request after the other. Returns when it has
-  /// answered.
+  /// Rank 0 answers first, then looks at the rows, one request after the other. Returns the time at
+  /// which it has answered.
   double serve(double arrival, double answer_seconds, double rows_seconds) {
     const double begin = arrival > free_at_ ? arrival + costs_.poll_seconds : free_at_;
     const double answered = begin + answer_seconds;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A discrete-event simulation of the work queue (ranks/work_queue.h) on clusters that are not at
-// hand: the real rule for blocks, costs measured on one machine, times of items drawn.
+// A discrete-event simulation of the work queue (ranks/work_queue.h) on clusters that we do not
+// have. Blocks follow the real rule, costs are measured on one machine, and times of items are
+// drawn at random.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +15,7 @@ struct QueueCosts {
   double latency_seconds = 5e-6;  ///< of one message
   double poll_seconds = 25e-6;  ///< mean wait for rank 0, which sleeps 50 us when nothing is there
   double request_seconds = 5e-6;   ///< of rank 0, per request
-  double receive_seconds = 20e-6;  ///< of rank 0, per row that is sent to it
+  double receive_seconds = 20e-6;  ///< of rank 0, per row sent to it
   double write_seconds = 10e-6;    ///< of a rank, per row that it writes itself
   double row_bytes = 500.0;        ///< in a message or a journal
   double kept_row_bytes = 600.0;   ///< of a row in memory
@@ -48,7 +49,7 @@ struct SimulatedRun {
   double lost_at_end = 0.0;           ///< share of the ranks' time after their last item
   double longest_wait_seconds = 0.0;  ///< of a request
   double manager_bytes = 0.0;         ///< through rank 0
-  double waiting_bytes = 0.0;         ///< most that stood before rank 0 at a time
+  double waiting_bytes = 0.0;         ///< most that waited for rank 0 at a time
   double kept_bytes = 0.0;            ///< rows on rank 0 at the end
   std::int64_t requests = 0;
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How af-evaluate registration would scale: the work queue simulated on up to 10 000 ranks, with
-// what messages and rows cost here.
+// How af-evaluate registration would scale: simulates the work queue on up to 10 000 ranks, with
+// the costs of messages and rows on this machine.
 #include <array>
 #include <cmath>
 #include <iomanip>
@@ -38,7 +38,7 @@ std::vector<ItemTimes> known_times() {
           {"paper, 50 ms", 50e-3, 0.3}};
 }
 
-/// Of the field registrations of "NAME=registrations.csv".
+/// Median and spread of the field registrations in "NAME=registrations.csv".
 ItemTimes times_of(const std::string& named_file) {
   const std::size_t equals = named_file.find('=');
   if (equals == std::string::npos) throw UsageError("--registrations wants NAME=FILE");

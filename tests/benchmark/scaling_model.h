@@ -6,7 +6,7 @@
 
 namespace af::benchmark {
 
-/// What a cluster is taken to be: assumptions, not measurements.
+/// What the model assumes of a cluster; none of this is measured.
 struct ClusterAssumptions {
   int cores_per_node = 64;
   double latency_seconds = 2e-6;              ///< of one message between nodes
@@ -22,8 +22,8 @@ struct PhaseCost {
 
   /// Amdahl, T(n) = fixed + shared / n: for phases with work that every rank or one rank does.
   static PhaseCost from_one_and_two_ranks(double one, double two);
-  /// T(n) = contention * shared / n: for phases that ranks do apart, and what they lose they take
-  /// from each other's caches and memory.
+  /// T(n) = contention * shared / n: for phases that ranks do apart, where they slow each other
+  /// down only through caches and memory.
   static PhaseCost without_fixed_part(double one, double two);
 
   [[nodiscard]] double seconds(int ranks) const;

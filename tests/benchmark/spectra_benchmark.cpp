@@ -48,7 +48,8 @@ class ValueFit {
   [[nodiscard]] double rms() const {
     return std::sqrt(std::max(0.0, (drr_drr_ - 2.0 * drr_xray_ + xray_xray_) / count_));
   }
-  /// What the straight line that fits best leaves, as registration by correlation does.
+  /// What remains beside the straight line that fits best; registration by correlation sees no
+  /// more.
   [[nodiscard]] double rms_about_line() const {
     const double variance = xray_xray_ - xray_ * xray_ / count_;
     const double covariance = drr_xray_ - drr_ * xray_ / count_;
@@ -83,8 +84,8 @@ ValueFit fit_of(const RegistrationProblem& problem, const RigidTransform& room_f
   return fit;
 }
 
-/// Milliseconds of a DRR of the first view, the median of several at poses of their own: renderers
-/// keep what they can for the next pose.
+/// Milliseconds of a DRR of the first view: the median of several, each at its own pose, because
+/// renderers keep what they can from one pose to the next.
 double milliseconds(const RegistrationProblem& problem, const RigidTransform& pose, int drrs) {
   const RegistrationView& view = problem.views.front();
   const auto workspace = view.renderer->make_workspace();
@@ -166,7 +167,7 @@ void print_rows(const Options& options, const Communicator& world) {
 
 }  // namespace
 
-// Binding options can throw only by a defect, which may well end the program.
+// Only a defect in the declaration of options can throw here, and it may end the program.
 // NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
   Options options;

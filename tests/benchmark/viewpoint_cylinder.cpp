@@ -12,19 +12,20 @@ namespace af::benchmark {
 
 namespace {
 
-/// More than rays turn between source and cylinder, and sources beside where their turns put them.
+/// Rays turn by less than the first between source and cylinder. Sources lie less than the second
+/// beside where their turns put them.
 constexpr double kMostTurnRad = 4.0 * kRadPerDeg;
 constexpr double kMostAsideRad = 20.0 * kRadPerDeg;
 
-/// Across the axis (mm): what tells where a ray meets the cylinder from where its source is.
+/// Distances across the axis (mm), which say how far from its source a ray meets the cylinder.
 struct AcrossAxis {
   double farthest_pass_mm = 0.0;  ///< of a ray from the axis
   double nearest_source_mm = 0.0;
   double farthest_source_mm = 0.0;
 };
 
-/// Bounds over a member's poses. How far a ray passes is linear in the shift, and its sign is that
-/// of the side that the axis is seen on, so corners decide over shifts and detector.
+/// Bounds over a member's poses. How far a ray passes the axis is linear in the shift, and its sign
+/// says on which side. So the corners decide over shifts and detector.
 AcrossAxis across_axis(const OrbitScene& scene, const OrbitMember& member) {
   const Eigen::Vector3d center = scene.frame.center_room_mm;
   const auto flat = [](const Eigen::Vector3d& a) { return Eigen::Vector2d(a.x(), a.y()); };
@@ -61,7 +62,7 @@ AcrossAxis across_axis(const OrbitScene& scene, const OrbitMember& member) {
   return {most[0], -most[1], most[2]};
 }
 
-/// Most that the angle about the axis changes along a ray from its source to the cylinder.
+/// The largest change of the angle about the axis along a ray from its source to the cylinder.
 double largest_turn(const AcrossAxis& across, double radius_mm) {
   const auto seen_at = [&](double distance_mm) {
     return std::asin(std::min(1.0, across.farthest_pass_mm / distance_mm));
@@ -78,7 +79,8 @@ OrbitMember member_at(const OrbitScene& scene, double angle_rad, double reach_ra
   return member;
 }
 
-/// How far aside of their turns sources come: what the member's box is wider than its reach.
+/// How far sources come beside where their turns put them: by so much the member's box is wider
+/// than its reach.
 double aside_of(const OrbitMember& member, double reach_rad) {
   return std::max(member.sized_for.high.rotation_rad.z(), -member.sized_for.low.rotation_rad.z()) -
          reach_rad;
@@ -107,7 +109,8 @@ ViewpointCylinder::ViewpointCylinder(const OrbitScene& scene, double step_rad) {
   room_from_axis.translation() = scene.isocenter_point;
   axis_from_ct_ = room_from_axis.inverse() * scene.frame.nominal_room_from_ct();
 
-  // What cameras and poses add up to, then where sources and last rays come beyond that.
+  // First the angles that cameras and poses add up to, then how far sources and the last rays come
+  // beyond these.
   const double from = scene.orbit.from_rad - scene.range.high.rotation_rad.z();
   const double to = scene.orbit.to_rad - scene.range.low.rotation_rad.z();
   constexpr double kProbeRad = 10.0 * kRadPerDeg;
@@ -138,7 +141,7 @@ std::optional<ColumnsOfRay> ViewpointCylinder::columns_of(const Ray& ray_ct) con
   const Eigen::Vector3d direction = axis_from_ct_.linear() * ray_ct.direction;
   const Eigen::Vector2d start(origin.x(), origin.y());
   const Eigen::Vector2d along(direction.x(), direction.y());
-  // The first of |start + x along| = radius, also behind the source.
+  // The first solution of |start + x along| = radius, even behind the source.
   const double a = along.squaredNorm();
   const double half_b = start.dot(along);
   const double discriminant = half_b * half_b - a * (start.squaredNorm() - radius_mm_ * radius_mm_);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The rays of a C-arm's orbit seen from viewpoints on a cylinder, each column of them with (s,t)
-// planes of its own: what atlases of planes are compared with (docs/other-cameras.md).
+// The rays of a C-arm's orbit seen from viewpoints on a cylinder. Each column of viewpoints has its
+// own (s,t) planes. Atlases of planes are compared with this (docs/other-cameras.md).
 #pragma once
 
 #include <array>
@@ -16,7 +16,7 @@ namespace af::benchmark {
 /// The depth slabs of a CT in a frame (slab_from_ct).
 using DepthSlabsOf = std::function<DepthSlabs(const RigidTransform&)>;
 
-/// A rig's camera, the CT before it and what of both is to be held.
+/// A rig's camera, the CT before it, and the range of poses and the orbit that are to be held.
 struct OrbitScene {
   CameraGeometry camera;
   Eigen::Vector3d isocenter_point = Eigen::Vector3d::Zero();
@@ -27,35 +27,36 @@ struct OrbitScene {
   DepthSlabsOf depth_slabs;
 };
 
-/// A ray among the columns: its value is the mean of the columns' with these weights.
+/// A ray among the columns: its value is the mean of two columns' values with these weights.
 struct ColumnsOfRay {
   int lower = 0;        ///< this column and the next
   double weight = 0.0;  ///< of the next
 };
 
 /// Viewpoints at equal angles on a cylinder about the room's z through the isocentre, fixed to the
-/// CT as a field's planes are. A ray is told by where it meets the cylinder on its way in, and in
-/// each of the two columns beside that by where it meets the plane that touches the cylinder there,
-/// along the axis, and the column's own (s,t) planes, which are turned to face it.
+/// CT as a field's planes are. A ray is found between two columns by where it meets the cylinder on
+/// its way in. In each column two points place it: where it meets the plane that touches the
+/// cylinder there (along the axis), and where it meets the column's own (s,t) planes, which face
+/// the column.
 /// \test ViewpointCylinder.HoldsEveryRayOfTheOrbit
 class ViewpointCylinder {
  public:
-  /// Sized to hold every ray of the range at every angle of the orbit: columns at most `step_rad`
-  /// apart from the least angle at which a ray meets the cylinder to the largest, each with the v,
-  /// s and t of all rays that come within a step of it. InputError where sources move too far
-  /// aside.
+  /// Sized to hold every ray of the range at every angle of the orbit. Columns are at most
+  /// `step_rad` apart, from the least angle at which a ray meets the cylinder to the largest. Each
+  /// holds the v, s and t of all rays within a step of it. Throws InputError when sources move too
+  /// far aside.
   ViewpointCylinder(const OrbitScene& scene, double step_rad);
 
-  /// Of each column its planes; y = uv_plane_y_mm touches the cylinder. Nothing is stored along u.
+  /// The planes of each column; y = uv_plane_y_mm touches the cylinder. Nothing is stored along u.
   [[nodiscard]] const std::vector<LightSlab>& columns() const { return columns_; }
-  /// By which the nominal camera is turned to stand at a column.
+  /// The angle by which the nominal camera is turned to stand at a column.
   [[nodiscard]] double angle_rad(int column) const { return first_rad_ + column * step_rad_; }
   /// Viewpoints of a column (its slab frame) lie along z, at this x.
   [[nodiscard]] double viewpoint_x_mm(int column) const {
     return viewpoint_x_mm_[static_cast<std::size_t>(column)];
   }
-  /// Where a ray (ct frame) stands among the columns; none where it is beyond the outermost, or
-  /// passes the axis farther away than the cylinder.
+  /// Where a ray (ct frame) lies among the columns. Empty when it is beyond the outermost, or
+  /// passes the axis outside the cylinder.
   [[nodiscard]] std::optional<ColumnsOfRay> columns_of(const Ray& ray_ct) const;
 
  private:
@@ -67,8 +68,8 @@ class ViewpointCylinder {
   std::vector<double> viewpoint_x_mm_;
 };
 
-/// Planes of a member of an orbit, with nodes so dense along (s,t) that what is stored of them is
-/// cut at the edge of the CT's shadow.
+/// Planes of a member of an orbit. Nodes are so dense along (s,t) that the stored ones end at the
+/// edge of the CT's shadow.
 LightSlab planes_of(const OrbitScene& scene, const OrbitMember& member);
 
 }  // namespace af::benchmark

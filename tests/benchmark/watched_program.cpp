@@ -22,7 +22,7 @@ struct Process {
   std::string name;
 };
 
-/// Every process; one that ends while it is looked at is left out.
+/// Every process, but for those that end while this looks at them.
 std::map<pid_t, Process> running_processes() {
   std::map<pid_t, Process> processes;
   for (const auto& entry : std::filesystem::directory_iterator("/proc")) {
@@ -85,7 +85,7 @@ class OutputToFile {
   posix_spawn_file_actions_t actions_{};
 };
 
-/// The environment without what MPI told this process, which is none of the child's ranks.
+/// The environment without MPI's settings for this process, because the child is none of its ranks.
 std::vector<std::string> environment_of_child() {
   std::vector<std::string> variables;
   for (char** variable = environ; *variable != nullptr; ++variable) {

@@ -16,10 +16,10 @@ struct WatchedRun {
 
 enum class WatchMemory { No, Yes };
 
-/// Runs a command (no shell) with its output in `log`. With WatchMemory::Yes, 20 times a second,
-/// the proportional set sizes (PSS) of all processes named `process_name` below it are added:
-/// memory that ranks share counts once. That slows the program down, so its seconds are not those
-/// of a timing.
+/// Runs a command (no shell) with its output in `log`. With WatchMemory::Yes it adds up the
+/// proportional set sizes (PSS) of all processes named `process_name` below it, 20 times a second.
+/// In these, memory that ranks share counts once. Watching slows the program down, so its seconds
+/// are no timing.
 WatchedRun run_watched(const std::vector<std::string>& command,
                        const std::filesystem::path& log,
                        const std::string& process_name,

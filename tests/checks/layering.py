@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Holds every #include against what the CMakeLists.txt of its folder links, and the table of ARCHITECTURE.md against the tree.
+"""Compares every #include with what the CMakeLists.txt of its folder links, and the table of ARCHITECTURE.md with the tree.
 
 Usage: layering.py ROOT          one line per violation, exit code 1
        layering.py --graph ROOT  the includes between folders, for Graphviz (dot -Tsvg)
@@ -33,11 +33,11 @@ WATCHED = {  # header: the library as CMake knows it
     r"tiffio\.h$": "TIFF::TIFF",
     r"(pybind11/|Python\.h$|numpy/)": "pybind11",
 }
-# Who prints; a library never does.
+# Only these folders may print; a library never does.
 TERMINAL = re.compile(r"(iostream|cstdio|print)$")
 PRINTS = {"common/cli", "common/ranks", "precompute", "register", "evaluate", "evaluate/image_quality", "evaluate/registration",
           "evaluate/report", "evaluate/scan", "evaluate/simulate", "evaluate/sweeps", "tools/drr", "tools/inspect"}
-# Folders whose targets are no library of ours: what they may include.
+# What the folders may include that are no library of the programs.
 DOORS = {
     "library/attenuation_fields": (set(), set()),  # the public headers: nothing but the standard library
     "library": ({"common/", "register", "register/", "evaluate/statistics", "library/attenuation_fields"}, set()),
@@ -105,7 +105,7 @@ class Tree:
                 self.report("CMakeLists.txt", f"lists {folder}, which has no CMakeLists.txt")
                 continue
             self.folders[folder] = Folder(cmake.read_text())
-            # A program's own library stands in the LIBS of the same folder.
+            # A program states its own library in the LIBS of the same folder.
             self.folders[folder].uses.discard(folder)
             for used in self.folders[folder].uses - set(listed[:place]):
                 self.report(f"{folder}/CMakeLists.txt", f"uses {used}, which does not stand above it in the list of CMakeLists.txt")

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Every relative link of every Markdown page below ROOT leads to a file that is there, and to a heading that is there,
-and docs/data/README.md names every table in its folder.
+"""Checks that every relative link of every Markdown page below ROOT leads to an existing file and heading, and that
+docs/data/README.md names every table in its folder.
 
 Usage: links.py ROOT
        links.py --self-test
@@ -17,7 +17,7 @@ HTML_LINK = re.compile(r"(?:href|src)=\"([^\"]+)\"")
 
 
 def outside_fences(text):
-    """The lines, those of fenced blocks empty; as many lines as before."""
+    """The lines of the text, with those of fenced blocks emptied, so that line numbers stay."""
     lines, fence = [], None
     for line in text.splitlines():
         mark = re.match(r"\s*(```+|~~~+)", line)
@@ -33,7 +33,7 @@ def outside_fences(text):
 
 
 def without_code(text):
-    """The lines outside fenced blocks, without `code`; as many lines as before."""
+    """The lines outside fenced blocks, without `code`. Line numbers stay."""
     return [re.sub(r"`[^`]*`", "", line) for line in outside_fences(text)]
 
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# A program maps one HDF5 library, the parallel one: ITK's serial HDF5 beside it would crash at random.
+# A program must map only the parallel HDF5 library. With ITK's serial HDF5 beside it, it would crash at random.
 # Usage: one_hdf5.sh PROGRAM...
 set -euo pipefail
 parallel_seen=no

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Every struct of options with which a program runs is one of tests/unit/described_options_test.cpp. Usage: options.sh ROOT
+# Every struct of options that a program takes must be listed in tests/unit/described_options_test.cpp.
+# Usage: options.sh ROOT
 set -euo pipefail
 cd "$1"
 mapfile -t structs < <(grep -rhoP '\bvoid run_\w+\(const (\w+::)*\K\w+Options(?=& options,)' --include='*.cpp' common evaluate precompute register | sort -u)

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Tables whose rows are rows of a CSV of docs/data: every row of such a table says what a row of a CSV does to which its
-section links, cell by cell, and is of the condition that its first cell names. Which tables are of this kind is told by
-their headers; a kind that no page has any more is an error.
+"""Checks tables whose rows come from a CSV of docs/data. Every row must equal, cell by cell, a row of a CSV to which
+its section links, and be of the condition that its first cell names. Headers tell which tables are of this kind. A kind
+that no page has is an error.
 
 Usage: rows.py ROOT               names rows that no linked CSV has
        rows.py --print KIND CSV   the rows of a CSV as a page has them: KIND is one of population, uncertainty, peers
@@ -54,25 +54,25 @@ def population_words(row):
 
 
 def population_cells(row):
-    """Of af-evaluate population: by TRE; conditions of one view by mRPD. Tables with both have prefixes."""
+    """A row of af-evaluate population: by TRE, or with one view by mRPD. Tables with both have prefixes."""
     error = "" if "error" in row else "mrpd_" if re.search(r"-1-", row["condition"]) else "tre_"
 
-    def of(column):
+    def value(column):
         return number(row, error + column)
 
     starts = int(row["starts"])
     ends_whole = "" if row[f"{error}capture_ended_by"] == "failures" else ">= "
-    mean_whole = ">= " if of("patients_capture_lower_bounds") > 0 else ""
-    low, high = of("share_with_failures_low"), of("share_with_failures_high")
+    mean_whole = ">= " if value("patients_capture_lower_bounds") > 0 else ""
+    low, high = value("share_with_failures_low"), value("share_with_failures_high")
     return [
         row["patients"],
         f"{row[f'{error}successes']} of {starts}",
-        f"{100 * of('rate'):.1f} ({100 * of('bootstrap_low'):.1f} to {100 * of('bootstrap_high'):.1f})",
+        f"{100 * value('rate'):.1f} ({100 * value('bootstrap_low'):.1f} to {100 * value('bootstrap_high'):.1f})",
         f"{row[f'{error}patients_with_failures']}: {100 * low:.1f} to {100 * high:.1f}",
-        f"{100 * of('worst_patient_rate'):.1f}",
-        f"{100 * of('below_1_mm') / starts:.1f} / {100 * of('below_5_mm') / starts:.1f}",
-        f"{ends_whole}{of('capture_mm'):.0f} ({of('capture_bootstrap_low_mm'):.0f} to {of('capture_bootstrap_high_mm'):.0f})",
-        f"{mean_whole}{of('patients_capture_mean_mm'):.1f}",
+        f"{100 * value('worst_patient_rate'):.1f}",
+        f"{100 * value('below_1_mm') / starts:.1f} / {100 * value('below_5_mm') / starts:.1f}",
+        f"{ends_whole}{value('capture_mm'):.0f} ({value('capture_bootstrap_low_mm'):.0f} to {value('capture_bootstrap_high_mm'):.0f})",
+        f"{mean_whole}{value('patients_capture_mean_mm'):.1f}",
         fixed(number(row, "median_error_mm" if "error" in row else "median_tre_mm"), 2),
     ]
 
@@ -86,7 +86,7 @@ def with_interval(row, column, digits, scale=1.0, unit=""):
 
 
 def uncertainty_words(row):
-    """... of a row that begins with '...' views are those of a row above."""
+    """What the first cell says. When it begins with '...', a row above names the views."""
     measure, _, group = row["measure"].partition(", ")
     presets = row["presets"].split(",")
     every = "all three" if len(presets) == 3 else "both" if len(presets) == 2 else presets[0]
@@ -96,7 +96,7 @@ def uncertainty_words(row):
 
 
 def uncertainty_cells(row):
-    """Of jobs/uncertainty.py --csv."""
+    """The cells of a row of jobs/uncertainty.py --csv."""
     return [
         row["cases"],
         with_interval(row, "pose_region", 1, 100.0, " %"),
@@ -113,7 +113,7 @@ def peers_words(row):
 
 
 def peers_cells(row):
-    """Of jobs/peers.sh; 'pays after' has its unit in the first row of a table alone."""
+    """The cells of a row of jobs/peers.sh. Only the first row of a table gives the unit of 'pays after'."""
     return [
         row["method"].removesuffix("-nelder-mead"),
         {"autodiff": "PyTorch"}.get(row["drrs"], row["drrs"].removesuffix("-nelder-mead")),
@@ -124,7 +124,7 @@ def peers_cells(row):
     ]
 
 
-# By kind: header's cells that no other table has, what the first cell says of a CSV's row, and the cells after it.
+# For each kind: header cells that no other table has, what the first cell says of a CSV's row, and the cells after it.
 KINDS = {
     "population": (("Patients' own, mean, mm", "CTs' own, mean, mm"), population_words, population_cells),
     "uncertainty": (("Failures with 0.9 or more",), uncertainty_words, uncertainty_cells),
@@ -149,12 +149,12 @@ def sections_of(text):
 
 
 def says(label, words):
-    """Whether a first cell names a condition: a word behind '|' only where the label names views itself."""
+    """Whether a first cell names a condition. A word after '|' may be missing when the label begins with '...'."""
     return all(word.lstrip("|") in label or (word[0] == "|" and label.startswith("...")) for word in words)
 
 
 def rows_of_csv(file, kind):
-    """(words, cells) of its rows; none of a CSV of another kind."""
+    """(words, cells) of its rows. A CSV of another kind has none."""
     _, words_of, cells_of_row = KINDS[kind]
     with open(file, newline="", encoding="utf-8") as text:
         try:

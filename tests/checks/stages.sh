@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# The stage engine of jobs/: what is done again, and what a failure says. Usage: stages.sh ROOT
+# Tests the stage engine of jobs/: what is done again, and what a failure says. Usage: stages.sh ROOT
 set -euo pipefail
 root=$(cd "$1" && pwd)
 scratch=$(mktemp -d)
@@ -66,13 +66,13 @@ study 0 'stages_of_any_build=yes; stage build two ./tool -o two'
 says 'done before'
 runs_are 6
 
-# In a chain a stage is done again when one before it has changed.
+# In a chain, a stage is done again when an earlier one has changed.
 study 0 'stages_are_a_chain=yes; stage first a ./tool -o a; stage second b ./tool -o b'
 runs_are 8
 study 0 'stages_are_a_chain=yes; stage first a ./tool --fast -o a; stage second b ./tool -o b'
 runs_are 10
 
-# What other options have begun stays, or is thrown away.
+# Work that was begun with other options stays, or is thrown away.
 mkdir three.progress
 study 0 'stage third three run_ranks 1 ./tool -o three'
 [[ -d three.progress ]] || fail "unfinished work is gone"
@@ -96,7 +96,7 @@ says 'Nothing was found'
 program ./other 7
 study 7 'stage sixth six ./other -o six'
 
-# One run at a time.
+# Only one run at a time may use a folder.
 study 3 'bash study.sh'
 says 'another run is at work in'
 echo "stages: all as it should be"

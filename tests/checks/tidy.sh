@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# clang-tidy over the first-party sources (tests left out), as .clang-tidy says; any finding fails. Forty minutes on
-# two cores, so it is not a CTest entry. Usage: tidy.sh [PATH-PATTERN]
+# Runs clang-tidy over our sources (without tests), as .clang-tidy says. Any finding fails. It takes forty minutes on two
+# cores, so it is no CTest entry. Usage: tidy.sh [PATH-PATTERN]
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
 source "$(dirname "$0")/source_files.sh"
@@ -13,10 +13,11 @@ cd "$root"
 cmake --preset dev -B "$build" >/dev/null
 sources=$(python3 tests/checks/unify_sources.py "$build/compile_commands.json" "$root" "$pattern" "$build/unified")
 ((sources > 0)) || { echo "no sources match $pattern" >&2; exit 1; }
-# Inner loops index images of less than 2^31 pixels by int, and leave registers uninitialised that they fill at once.
+# Kernels may do what the other sources may not. Their inner loops index images of less than 2^31 pixels by int, and leave
+# registers uninitialised that they fill at once.
 of_kernels=-bugprone-implicit-widening-of-multiplication-result,-bugprone-easily-swappable-parameters
 of_kernels+=,-cppcoreguidelines-pro-type-member-init,-clang-analyzer-optin.performance.Padding
-# tidy UNIT-PATTERN OPTIONS...: checks the units whose name matches. An empty list is none to check.
+# tidy UNIT-PATTERN OPTIONS...: checks the units whose name matches. An empty list is no error.
 tidy() {
   local units=$1
   shift

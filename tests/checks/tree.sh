@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# The tree holds no path of anybody's machine, no tab and no mark of an unfinished merge, every source names its licence,
-# every text file ends with a line end, and files that state the version state the same. Usage: tree.sh ROOT
+# The tree holds no path of anybody's machine, no tab and no mark of an unfinished merge. Every source names its licence,
+# and every text file ends with a line end. Files that state the version agree. Usage: tree.sh ROOT
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
 source "$(dirname "$0")/source_files.sh"
@@ -10,7 +10,7 @@ mapfile -d '' -t files < <(list_sources "$root" '*.h' '*.cpp' '*.in' '*.txt' '*.
 ((${#files[@]} > 0)) || { echo "no sources found below $root" >&2; exit 1; }
 cd "$root"
 failed=no
-# A home folder, a scratch folder, or a mount of one machine.
+# Such paths are home folders, scratch folders and mounts.
 if grep -nE '(^|[^[:alnum:]._$}/-])/(home/[a-z]|root/|work/|mnt/|Users/|tmp/[a-z]+/)' -- "${files[@]}"; then
   echo "tree: the lines above hold a path of one machine" >&2
   failed=yes
@@ -19,7 +19,7 @@ if grep -nE '^(<{7}|>{7}) ' -- "${files[@]}"; then
   echo "tree: the lines above are marks of an unfinished merge" >&2
   failed=yes
 fi
-# A tab that was meant to be "\t...", or indentation that looks different everywhere.
+# A tab was meant to be "\t", or is indentation that looks different in every editor.
 if grep -nP '\t' -- "${files[@]}"; then
   echo "tree: the lines above hold a tab" >&2
   failed=yes

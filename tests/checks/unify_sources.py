@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Makes few translation units of many, for clang-tidy: it parses a header once per unit, and ITK's for seconds.
+"""Makes few translation units of many for clang-tidy, which parses a header once per unit, and ITK's for seconds.
 
 Usage: unify_sources.py COMPILE_COMMANDS ROOT PATTERN OUTPUT_FOLDER
 

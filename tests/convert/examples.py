@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files as other programs write them, of every format, and helpers of the tests."""
+"""Files of every format as other programs write them, and helpers of the tests."""
 import contextlib
 import io
 import pathlib
@@ -128,7 +128,7 @@ Intrinsic
 """
 PLASTIMATCH_COMMAND = ("#!/bin/sh\nplastimatch drr --nrm \"0.6 -0.7 0.2\" --vup='0.1 0.2 1' --sad 800 --sid 1200 \\\n"
                        "  -r \"240 200\" -z \"480 420\" -c \"110.5 95.25\" -o \"5 -7 11\" -t pfm -O out_ ct.mha\n")
-# What elastix 5.0.1 writes as TransformParameters.0.txt, without the lines that say nothing of the camera.
+# What elastix 5.0.1 writes as TransformParameters.0.txt, without the lines that say nothing about the camera.
 ELASTIX = """(Transform "EulerTransform")
 (TransformParameters 0 0 0 0 0 0)
 // a comment
@@ -213,7 +213,7 @@ def xa(without=(), **changes):
 
 
 def enhanced_xa(second_primary, frame_items=None, **changes):
-    """An enhanced XA image of two frames: what both share stands once, the angles per frame."""
+    """An enhanced XA image of two frames. It states once what both share, and the angles per frame."""
     geometry = dataset(DistanceSourceToDetector="1200", DistanceSourceToIsocenter=800.0)
     shared = dataset(XRayGeometrySequence=Sequence([geometry]),
                      FramePixelDataPropertiesSequence=Sequence([dataset(ImagerPixelSpacing=["0.4", "0.3"])]))
@@ -260,7 +260,7 @@ UNEVEN_POSE = transform(rotation_zyx(np.radians([11.0, -23.0, 47.0])), [101.0, -
 
 
 class KnownContext:
-    """Everything that a pose may ask."""
+    """A context that answers everything a reader of poses may ask."""
 
     def __init__(self, cameras=None, grid=None, ct_uid="1.2.3.4"):
         self.cameras, self.grid, self.ct_uid = cameras or [frontal_camera()], grid or uneven_grid(), ct_uid

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The worked examples of docs/cameras.md: where the cameras of other programs' files see a point, by hand or by that program."""
+"""The worked examples of docs/cameras.md: where cameras from other programs' files see a point, by hand or by that program."""
 import copy
 import unittest
 
@@ -220,7 +220,7 @@ class Rtk(FileTest):
             for one, other in zip(found.cameras, expected.cameras):
                 np.testing.assert_array_equal(one.source_point, other.source_point)
                 np.testing.assert_array_equal(one.project([10, 20, 30]), other.project([10, 20, 30]))
-        # Angle 119.4 as a user expects it: RTK's source there.
+        # RTK has its source there at the angle 119.4, as a user expects.
         np.testing.assert_allclose(self.camera(rtk(written), **RTK_OPTIONS).source_point, [0, 0, 742.46], atol=1e-9)
 
     def test_refusals(self):
@@ -276,7 +276,7 @@ class Elastix(FileTest):
     def test_the_ball_that_it_draws(self):
         camera = self.camera(ELASTIX)
         np.testing.assert_array_equal(camera.source_point, [5, -800, 11])
-        # From the focal point the ball is 760 of 1100 mm away along y.
+        # Along y, the ball is 760 mm from the focal point, and the detector 1100 mm.
         scale = 1100 / 760
         self.assert_seen(camera, [30, -40, 55], [(200 + 5 + 25 * scale) / 2.0, (180 - (11 + 44 * scale)) / 2.1])
 

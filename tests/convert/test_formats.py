@@ -40,7 +40,7 @@ def files_of(rig, name, folder):
 
 
 def writable_rig(name, folder):
-    """The most general of some rigs that the format can state."""
+    """The most general of these rigs that the format can state."""
     for isocenter in ([5.0, -7.0, 11.0], [0.0, 0.0, 0.0]):
         for rig in (oblique_rig(isocenter), mirrored(oblique_rig(isocenter))):
             try:
@@ -52,7 +52,7 @@ def writable_rig(name, folder):
 
 
 def options_for(rig):
-    """What the format does not state, and a user would."""
+    """The options by which a user states what the format does not."""
     camera = rig.cameras[0]
     return RigOptions([one.name for one in rig.cameras], list(camera.size_px), list(camera.pixel_spacing_mm), rig.isocenter_point)
 
@@ -124,7 +124,7 @@ class EveryCameraFormat(FileTest):
 
 
 class Completion(unittest.TestCase):
-    """Of files that state nothing but rays."""
+    """How rigs are completed from files that state nothing but rays."""
 
     def setUp(self):
         self.stated = StatedRig([StatedCamera(camera, has_name=True, has_spacing=False) for camera in c_arm_rig().cameras],
@@ -142,7 +142,7 @@ class Completion(unittest.TestCase):
         np.testing.assert_allclose(rig.isocenter_point, [0, 0, 0], atol=1e-9)
         self.assertAlmostEqual(rig.cameras[0].source_detector_mm, 975, 9)  # 1.5 times the 650 mm from the source
         self.assertEqual([any(word in note for note in notes) for word in ("isocentre", "pixel spacing", "LAT")], [True] * 3)
-        # Of skew rays it is the middle of their shortest segment.
+        # For skew rays it is the middle of the shortest segment between them.
         lat = self.stated.cameras[1].camera
         lat.source_point, lat.detector_origin_point = lat.source_point + [0, 0, 4], lat.detector_origin_point + [0, 0, 4]
         np.testing.assert_allclose(self.complete()[0].isocenter_point, [0, 0, 2], atol=1e-9)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Ten thousand damaged files of every format: each is converted, or refused as input or as a file; none takes long or much
-memory. Seeded: a failure comes again."""
+"""Ten thousand damaged files of every format. Each is converted, or refused as input or as a file, without much time or
+memory. The seed is fixed, so a failure comes again."""
 import collections
 import pathlib
 import random
@@ -67,7 +67,7 @@ def cpu_seconds():
 
 
 def outcome(path, options):
-    """How a file ends, as cameras or as a pose."""
+    """What becomes of a file, read as cameras or as a pose."""
     try:
         source = formats.Source(path)
         if formats.recognised(source, formats.CAMERAS) is not None:
@@ -98,7 +98,7 @@ def main():
             source = random_.choice(hdf5 if random_.random() < SHARE_OF_HDF5 else others)
             content = mutated(source, random_, others)
             path = folder / "damaged"
-            path.unlink(missing_ok=True)  # ext4 waits for the disk where a file is cut to nothing and written anew
+            path.unlink(missing_ok=True)  # ext4 waits for the disk when a file is truncated and written anew
             path.write_bytes(content)
             started = cpu_seconds()
             try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Poses in the formats of other programs, each against what its convention says of points; every example of docs/poses.md."""
+"""Poses in the formats of other programs, compared with what each convention says of points. Has every example of docs/poses.md."""
 import pathlib
 import re
 import unittest
@@ -46,7 +46,7 @@ class EveryPoseFormat(Poses):
         for one in WRITTEN:
             with self.subTest(one.name):
                 content = self.written(one.name)
-                # One line of 16 numbers is told from a plain matrix by its name alone.
+                # Only its name tells one line of 16 numbers from a plain matrix.
                 name = "a.tra" if one.name == "autoscoper" else "pose"
                 np.testing.assert_allclose(self.pose(content, name), UNEVEN_POSE, rtol=0, atol=DICOM_MM)
                 self.assertEqual(formats.recognised(Source(self.file(content, name)), formats.POSES).name, one.name)

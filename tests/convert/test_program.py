@@ -16,7 +16,7 @@ PROGRAMS = os.environ.get("AF_PROGRAMS", "")
 
 
 def mha(grid):
-    """A CT of that grid."""
+    """A CT with this grid."""
     direction = " ".join(repr(float(value)) for value in grid.direction.T.ravel())
     header = (f"ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nTransformMatrix = {direction}\n"
               f"Offset = {' '.join(map(str, grid.origin_mm))}\nElementSpacing = {' '.join(map(str, grid.spacing_mm))}\n"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One DICOM file: its elements, and its pixels where they are not compressed (GDCM decodes those).
+// One DICOM file: its elements, and its pixels unless they are compressed (GDCM decodes those).
 #include <optional>
 
 #include "fuzz/fuzz_input.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A DICOM series as a CT: a sound one whose slices get other values where the input says so. What
-// is accepted is a CT with sound geometry, also where it was resampled.
+// A DICOM series as a CT: a sound series, in which the input replaces values of slices. An accepted
+// CT must have sound geometry, even if it was resampled.
 #include <array>
 #include <map>
 #include <optional>
@@ -74,7 +74,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fuzz::InputBytes input(data, size);
   const CtReadOptions options = options_of(input.take<std::uint8_t>());
   const auto edits = static_cast<int>(input.take_below(8));
-  // Slices are written one after the other, while each edit names its own.
+  // Slices are written in order, but edits name slices in any order.
   std::map<int, std::vector<fuzz::InputBytes>> edits_of;
   constexpr std::size_t kMostEditBytes = 70;
   for (int edit = 0; edit < edits; ++edit) {

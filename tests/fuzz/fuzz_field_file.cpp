@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The structure of a field file. A sound one is changed through HDF5 as the input says (contents,
 // types, extents, layouts, filters, links, attributes), so that HDF5's own checksums agree and our
-// reader is what is tested; then the reader's checksums are mended where that is possible.
+// reader is tested. Then our checksums are mended where possible.
 #include <array>
 #include <fstream>
 #include <iterator>
@@ -44,13 +44,13 @@ void start_mpi() {
 struct SoundFile {
   std::string bytes;
   Codebook codebook;
-  std::vector<DatasetRule> payload;  ///< but for the indices
+  std::vector<DatasetRule> payload;  ///< without the indices
   std::vector<DatasetRule> indices;
   std::vector<std::string> names;  ///< of groups and datasets
   bool is_atlas = false;
 };
 
-/// The parts of a file that every kind of it has.
+/// Adds what every kind of file has.
 SoundFile written_file(SoundFile sound, const std::vector<Dataset>& beside) {
   sound.bytes = bytes_of_file(fuzz::scratch_folder() / kElsewhere);
   sound.names = {"/", "/geometry", "/field", "/field/slab_0", "/field/slab_1"};
@@ -112,7 +112,7 @@ SoundFile sound_atlas(const AttenuationAtlas& atlas) {
   return written_file(sound, {});
 }
 
-/// Everything that a file may or may not have, each once.
+/// Sound files that together have everything that a file may have.
 std::vector<SoundFile> sound_files() {
   start_mpi();
   const CompressedAttenuationField plain = fuzz::sample_field();
@@ -166,7 +166,7 @@ Handle any_space(fuzz::InputBytes& input) {
 
 Handle any_creation(hid_t space, fuzz::InputBytes& input) {
   Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose, "H5Pcreate");
-  // Of large ones HDF5 would make all chunks; without storage only their extents are large.
+  // For large extents HDF5 would create all chunks. With the default layout it stores nothing.
   constexpr hssize_t kMostElements = 1 << 20;
   if (H5Sget_simple_extent_npoints(space) > kMostElements) return creation;
   const int rank = H5Sget_simple_extent_ndims(space);
@@ -194,7 +194,7 @@ Handle any_creation(hid_t space, fuzz::InputBytes& input) {
   return creation;
 }
 
-/// Whether its contents can be held here; they have at least one element then.
+/// Whether the contents have at least one element and fit into memory here.
 bool is_small(hid_t dataset, hid_t type) {
   constexpr std::size_t kMostBytes = 1u << 22;
   const Handle space(H5Dget_space(dataset), H5Sclose, "H5Dget_space");
@@ -269,7 +269,7 @@ void change_attribute(hid_t file, const std::string& name, fuzz::InputBytes& inp
   if (H5Aexists(object, attribute) > 0) H5Adelete(object, attribute);
   const Handle type = any_type(input);
   const Handle space = any_space(input);
-  // HDF5 writes an attribute when it makes it, and holds it whole.
+  // HDF5 holds a whole attribute in memory, so it must be small.
   constexpr hssize_t kMostBytes = 1 << 22;
   const auto width = static_cast<hssize_t>(H5Tget_size(type));
   if (H5Sget_simple_extent_npoints(space) > kMostBytes / width) return;
@@ -294,7 +294,7 @@ void change(hid_t file, const std::vector<std::string>& names, fuzz::InputBytes&
   }
 }
 
-/// The hash over all datasets, as far as their hashes can be found.
+/// Mends the hash over all datasets, as far as their own hashes can be read.
 void mend_payload_hash(hid_t file, const SoundFile& sound) {
   std::vector<Dataset> datasets;
   for (const DatasetRule& rule : sound.payload)
@@ -340,8 +340,8 @@ void read_all(const std::filesystem::path& path) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const std::vector<SoundFile> files = sound_files();
-  // HDF5 keeps a megabyte for each file it opens: kept for the next one, it need not be mapped
-  // anew.
+  // HDF5 takes a megabyte for each file that it opens. Keeping it for the next file saves mapping
+  // it anew.
   static const herr_t keeps_memory = H5set_free_list_limits(-1, -1, -1, -1, -1, -1);
   fuzz::require(keeps_memory >= 0, "HDF5 takes the limits");
   const hdf5::QuietErrors quiet;

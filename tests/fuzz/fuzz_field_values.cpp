@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The values of a field file, as if every checksum agreed: numbers of a sound field are replaced by
-// any others. What is accepted must be a field that DRRs can be looked up in.
+// The values of a field file, as if every checksum agreed. Any numbers replace those of a sound
+// field. DRRs must be able to look up every field that is accepted.
 #include <array>
 #include <memory>
 #include <optional>
@@ -26,7 +26,7 @@ void replace_values(std::vector<field_layout::Dataset>& datasets, fuzz::InputByt
   }
 }
 
-/// Codeword 0, and mean 0, everywhere; false when that would be more than a test wants to hold.
+/// Sets codeword 0, and mean 0, everywhere. False when the indices would be too large for a test.
 bool add_indices(CompressedAttenuationField& field) {
   for (std::size_t k = 0; k < field.light_slab.slabs.size(); ++k) {
     std::uint64_t tiles = 1;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Poses that a registration is judged by or begins at: a folder of files of one pose each, and any
-// of these as a file of starts.
+// Poses by which registrations are judged, or at which they begin: a folder of files with one pose
+// each, and each of these files as a file of starts.
 #include <array>
 #include <string>
 #include <vector>

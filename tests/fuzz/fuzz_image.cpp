@@ -25,7 +25,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     });
     return 0;
   }
-  // What belongs to an image lies beside it.
+  // The voxels of an image must lie beside its header.
   fuzz::require(header->data_file.lexically_normal().native().starts_with(
                     fuzz::scratch_folder().lexically_normal().native()),
                 "voxels come from the header's folder");

@@ -34,7 +34,7 @@ fs::path written(const std::string& name, std::string_view bytes) {
 
 void require(bool condition, const char* what) {
   if (condition) return;
-  std::fprintf(stderr, "fuzz: does not hold of an accepted input: %s\n", what);
+  std::fprintf(stderr, "fuzz: not true of an accepted input: %s\n", what);
   std::abort();
 }
 

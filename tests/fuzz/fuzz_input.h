@@ -24,16 +24,17 @@ const std::filesystem::path& scratch_folder();
 /// Writes an input under a name within scratch_folder(); returns its path.
 std::filesystem::path written(const std::string& name, std::string_view bytes);
 
-/// Ends the process with a message: what must hold of every input that a reader accepts.
+/// Ends the process with a message unless the condition holds, which every accepted input must
+/// meet.
 void require(bool condition, const char* what);
 
 inline std::string_view as_text(std::span<const std::uint8_t> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-/// Runs `read`; false when it refused the input with one of the project's errors. Everything else
-/// that is thrown (out of memory, broken promises, other libraries' exceptions, also where
-/// all_or_none() made an error of them) ends the process and is a finding.
+/// Runs `read`; false when it refused the input with one of the project's errors. Any other
+/// exception ends the process and is a finding: out of memory, broken promises, other libraries'
+/// exceptions, even when all_or_none() has turned them into errors.
 template <typename Read>
 bool is_accepted(Read&& read) {
   try {
@@ -45,7 +46,7 @@ bool is_accepted(Read&& read) {
   }
 }
 
-/// Takes an input apart from its front. At its end there are zeros.
+/// Takes values from the front of an input. After its end come zeros.
 class InputBytes {
  public:
   InputBytes(const std::uint8_t* data, std::size_t size) : rest_(data, size) {}

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Any file, as af-inspect takes it: told by content, read, and described as text and as JSON. HDF5
-// and what other libraries decode have fuzzers of their own, or none.
+// Any file, as af-inspect takes it: recognised by content, read, and described as text and as JSON.
+// HDF5 files and formats that other libraries decode have their own fuzzers, or none.
 #include <array>
 
 #include "fuzz/fuzz_input.h"

@@ -57,7 +57,8 @@ void damage(fuzz::InputBytes& input) {
   }
 }
 
-/// What is read must be some of what was appended, in order; and the journal goes on from there.
+/// The records that are read must be some of those appended, in order. The journal then continues
+/// from there.
 void read_and_go_on(const Records& appended) {
   const ProgressJournal journal(work());
   Records found = records_of(journal);

@@ -22,7 +22,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     std::optional<RigidTransform> again;
     fuzz::require(fuzz::is_accepted([&] { again = read_pose(fuzz::written("again", text)); }),
                   "a pose can be written and read");
-    // Of poses within 1 km, inverted twice.
+    // The rounding of poses within 1 km that are inverted twice.
     constexpr double kRoundingMm = 1e-3;
     fuzz::require((again->matrix() - pose.matrix()).cwiseAbs().maxCoeff() < kRoundingMm,
                   "a pose reads back as it was written");

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What af-precompute finds of an earlier run. The first bytes choose: a manifest of any content, a
 // shard of any content and name, sound records that are cut and changed afterwards, forged records
-// (with right checksums), or a training of any content with which one goes on.
+// (with right checksums), or a training of any content that is continued.
 #include <array>
 #include <fstream>
 #include <map>
@@ -47,7 +47,7 @@ WorkUnit unit_of(std::uint32_t id, std::array<int, 4> counts) {
   return unit;
 }
 
-/// Of 1, 6 and 72 tiles.
+/// Units of 1, 6 and 72 tiles.
 const std::vector<WorkUnit>& units() {
   static const std::vector<WorkUnit> some = {
       unit_of(0, {2, 2, 2, 2}), unit_of(1, {3, 2, 6, 1}), unit_of(2, {4, 3, 5, 12})};
@@ -74,7 +74,7 @@ std::map<std::uint32_t, UnitTiles> found_in(UnitStore& progress) {
   return found;
 }
 
-/// Reads what is there, goes on, and finds what it has then.
+/// Reads what is there, adds to it, and must then find both.
 void read_and_go_on() {
   std::map<std::uint32_t, UnitTiles> found;
   UnitTiles more = make_unit_tiles(units()[0], std::vector<std::uint16_t>(16, 5));
@@ -136,7 +136,7 @@ void put(std::string& bytes, T value) {
   bytes.append(reinterpret_cast<const char*>(&value), sizeof(value));
 }
 
-/// The checksums of a record agree with what it says; its fields need not make sense.
+/// A record whose checksums agree with its contents, although its fields need not make sense.
 std::string forged_record(fuzz::InputBytes& input) {
   constexpr std::array<const char*, 2> kMagics = {"AFRECOR4", "AFRECOR5"};
   const std::size_t magic = input.take_below(16) == 0 ? 1 : 0;
@@ -180,7 +180,7 @@ void write_shards(fuzz::InputBytes& input) {
   fuzz::written("progress/" + name, bytes);
 }
 
-/// A training with any begun one ends with a usable codebook.
+/// A training that continues any begun one ends with a usable codebook.
 void go_on_training(fuzz::InputBytes& input) {
   constexpr std::size_t kCodewords = 4;
   TrainedCodebook begun;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A study of any content; its files are not there.
+// A study of any content, whose files do not exist.
 #include <optional>
 
 #include "base/file_name.h"

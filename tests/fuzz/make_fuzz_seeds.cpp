@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Writes small inputs for the fuzzers to begin with, one folder per fuzzer: what our own programs
-// and tests write, and what once was a finding (findings/NAME.txt, a line of hexadecimal digits
+// and tests write, and former findings (a line of hexadecimal digits in findings/NAME.txt for
 // each).
 #include <filesystem>
 #include <fstream>
@@ -40,7 +40,7 @@ RigidTransform some_pose() {
   return pose_from_parameters(PoseFrame(), PoseParameters::from_deg_and_mm({1, -2, 3, 4, 5, -6}));
 }
 
-/// A template with its optional keys, which stand behind "# ".
+/// A template with its optional keys, which are commented out by "# ".
 std::string uncommented(std::string text) {
   for (std::size_t at = text.find("\n# "); at != std::string::npos;
        at = text.find("\n# ", at + 1)) {
@@ -182,7 +182,7 @@ void write_dicom_ct_seeds(const fs::path& folder) {
                     10)});
 }
 
-/// As af-inspect takes them: kind of the name, content.
+/// An input for af-inspect: the kind of file name, then the content.
 void write_inspect_seeds(const fs::path& folder) {
   const auto seed = [&](const char* name, char kind, const std::string& bytes) {
     write_seed(folder / "inspect" / name, kind + bytes);
@@ -244,7 +244,7 @@ void write_dicom_seeds(const fs::path& folder) {
   encoded.set_text({0x0008, 0x0060}, "CS", "CT");
   encoded.set_fragment("1.2.840.10008.1.2.4.70", "not a stream");
   encoded.write(folder / "dicom" / "encoded");
-  // Without file header, implicit, with a sequence of undefined length.
+  // A file without header, with implicit types and a sequence of undefined length.
   write_seed(folder / "dicom" / "implicit",
              "\x08\0\x60\0\2\0\0\0CT\x08\0\x40\x11\xff\xff\xff\xff\xfe\xff\0\xe0\xff\xff\xff\xff"
              "\x08\0\x50\x11\2\0\0\0"
@@ -252,7 +252,7 @@ void write_dicom_seeds(const fs::path& folder) {
              "\x28\0\x10\0\2\0\0\0\1\0\x28\0\x11\0\2\0\0\0\1\0\xe0\x7f\x10\0\2\0\0\0\1\1"s);
 }
 
-/// The first byte is how the study reads the file.
+/// The first byte says how the study reads the file.
 void write_dicom_xray_seeds(const fs::path& folder) {
   const fs::path scratch = folder / "dicom_xray.tmp";
   std::vector<int> levels(12 * 12, 3000);
@@ -305,8 +305,8 @@ void write_other_seeds(const fs::path& folder) {
              std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
 }
 
-/// The first byte chooses the field, or the file: of each version of the format, with a range of
-/// bounds, of bone alone, an atlas (sound_files() of fuzz_field_file.cpp).
+/// The first byte chooses the field or the file: one for each version of the format, one with a
+/// range of bounds, one of bone alone, an atlas (see sound_files() in fuzz_field_file.cpp).
 void write_field_seeds(const fs::path& folder) {
   constexpr char kValueKinds = 2;
   for (char kind = 0; kind < kValueKinds; ++kind) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Gives a fuzzer's function every file below the folders or files named, as libFuzzer would.
+// Calls a fuzzer's function with every named file and every file below the named folders, as
+// libFuzzer would.
 #include <exception>
 #include <fstream>
 #include <iostream>
@@ -27,7 +28,7 @@ int replay(int argc, char** argv) {
     for (const fs::path& path : files_below(argv[i])) {
       std::ifstream file(path, std::ios::binary);
       const std::vector<char> bytes(std::istreambuf_iterator<char>(file), {});
-      std::cout << path.string() << std::endl;  // before what may end the process
+      std::cout << path.string() << std::endl;  // the input may end the process
       LLVMFuzzerTestOneInput(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
       ++replayed;
     }

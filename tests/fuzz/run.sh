@@ -43,7 +43,7 @@ mkdir -p "$output"
 output=$(cd "$output" && pwd)
 "$binaries/make_fuzz_seeds" "$af_root/tests/fuzz/findings" "$output/seeds"
 
-# One process without mpirun; files in memory; a hostile size shows as a finding.
+# Each fuzzer is one process without mpirun, and keeps its files in memory. An allocation of a hostile size is a finding.
 export OMPI_MCA_ess_singleton_isolated=1 OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
 export TMPDIR=${TMPDIR:-/dev/shm}
 status=0
@@ -51,8 +51,8 @@ for name in "${names[@]}"; do
   mkdir -p "$output/$name/corpus"
   cd "$output/$name"
   leaks=1 most_mb=256 is_null=0
-  # OpenMPI and HDF5 keep memory until the end. On damaged files HDF5 loses some, and asks for as much as they say, which
-  # it is refused: terabytes, before it compares with the file's size.
+  # Open MPI and HDF5 keep memory until the end, and HDF5 loses some on damaged files. It also asks for as much memory as
+  # they state (terabytes) before it looks at the file's size. The sanitizer refuses that.
   case $name in
     field_file | shards) leaks=0 ;;
     pose | found_poses) leaks=0 most_mb=100000000 is_null=1 ;;

@@ -9,12 +9,12 @@
 
 namespace af::fuzz {
 
-/// A sound field of two slabs, small enough to be written thousands of times; without its indices.
+/// A sound field of two slabs without its indices, small enough to be written thousands of times.
 CompressedAttenuationField sample_field();
-/// The same of mean-removed tiles.
+/// The same with mean-removed tiles.
 CompressedAttenuationField sample_field_with_means();
 
-/// Two members beside each other, with the codebook of either.
+/// An atlas of two members that lie beside each other, with the field's codebook.
 AttenuationAtlas sample_atlas(const CompressedAttenuationField& field);
 
 /// All tiles of all slabs, one block per slab.

@@ -53,8 +53,8 @@ make_hosts() {
     mkdir -p "/etc/netns/$host"
     printf '127.0.0.1 localhost\n10.78.0.1 afhost1\n10.78.0.2 afhost2\n' >"/etc/netns/$host/hosts"
   done
-  # A host name of its own: otherwise Open MPI takes both for one and shares memory. The words after the host are a
-  # command line for a shell, as ssh takes them.
+  # Each host needs its own host name: otherwise Open MPI takes both for one, and shares memory. The words after the host
+  # are a command line for a shell, as for ssh.
   cat >"$scratch/agent" <<'AGENT'
 #!/bin/bash
 while [[ "$1" == -* ]]; do shift; done
@@ -63,7 +63,7 @@ shift
 exec ip netns exec "$host" unshare --uts -- /bin/bash -c 'hostname "$1"; shift; exec /bin/bash -c "$*"' _ "$host" "$@"
 AGENT
   chmod +x "$scratch/agent"
-  # The bridge learns where the hosts are.
+  # Traffic teaches the bridge where the hosts are.
   for i in 1 2 3 4 5 6 7 8 9 10; do
     ip netns exec afhost1 bash -c 'exec 3<>/dev/tcp/10.78.0.2/9' 2>/dev/null && break
     sleep 0.1
@@ -72,7 +72,7 @@ AGENT
 
 export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
 ends_on_loss=(--mca oob_tcp_keepalive_time 10 --mca oob_tcp_keepalive_intvl 2 --mca oob_tcp_keepalive_probes 3)
-# mpirun_options: what the job scripts give mpirun.
+# This sets mpirun_options as the job scripts do.
 # shellcheck source-path=SCRIPTDIR source=../../jobs/slurm/resources.sh
 source "$root/jobs/slurm/resources.sh"
 
@@ -100,7 +100,7 @@ study=$scratch/in/valid/study.toml
 range=(--study "$study" --max-rotation-deg 8 --max-translation-mm 20 --codewords 256)
 precompute=("$bin/af-precompute" "${range[@]}" --uv-nodes 24 --st-nodes 96 --training-fraction 0.5)
 cast=("$bin/af-precompute" "${range[@]}" --uv-nodes 80 --st-nodes 320 --training-fraction 0.02 --camera AP)
-# Casts for longer than a lost host stays unnoticed.
+# This casts for longer than it takes to notice a lost host.
 cast_slowly=("$bin/af-precompute" "${range[@]}" --uv-nodes 104 --st-nodes 224 --training-fraction 0.02 --camera AP --caster trilinear)
 register=("$bin/af-evaluate" registration --study "$study" --field AP=one-AP.h5 --field LAT=one-LAT.h5 --gold study
           --preset paper --intervals 4)
@@ -129,8 +129,8 @@ same_on_two_hosts() {
   echo "parallel_test: passes on two hosts"
 }
 
-# lose_host NAME FILES BYTES SECONDS MPIRUN-OPTIONS... -- PROGRAM...: on two hosts, the second one's cable out once FILES
-# in NAME.progress hold more than BYTES; how that ends. The output NAME must not exist then.
+# lose_host NAME FILES BYTES SECONDS MPIRUN-OPTIONS... -- PROGRAM...: runs on two hosts, unplugs the second once FILES in
+# NAME.progress hold more than BYTES, and prints how the job ends. The output NAME must not exist then.
 lose_host() {
   local name=$1 files=$2 enough=$3 seconds=$4
   shift 4
@@ -146,7 +146,7 @@ lose_host() {
   wait "$job" || code=$?
   echo "$name: $((SECONDS - begin)) s after the cut the job had ended with code $code ($kept bytes were kept by then)"
   { grep -vE '^[[:space:]]*$|^-+$' "$name.log" || true; } | tail -n 8 | cut -c1-150 | sed 's/^/    /'
-  # The lost host still runs: a cluster's resource manager would end what is there.
+  # The lost host still runs. On a cluster the resource manager would end its processes.
   local pid
   for pid in $(ip netns pids afhost1) $(ip netns pids afhost2); do kill -9 "$pid" 2>/dev/null || true; done
   ip link set afveth2 up
@@ -168,7 +168,7 @@ cut_while_registering() {
   lose_registrations keepalive "${ends_on_loss[@]}"
 }
 
-# lose_cast NAME.h5 WHOLE.h5 BYTES MPIRUN-OPTIONS... -- PROGRAM...: the cable out once so many bytes are kept.
+# lose_cast NAME.h5 WHOLE.h5 BYTES MPIRUN-OPTIONS... -- PROGRAM...: unplugs the second host once more than BYTES are kept.
 lose_cast() {
   local name=$1 whole=$2 enough=$3 options=() program
   shift 3

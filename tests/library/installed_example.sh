@@ -16,25 +16,25 @@ if grep -v '^\./attenuation_fields/' <<<"$headers"; then
   echo "installed_example: headers outside of include/attenuation_fields are installed (above)" >&2
   exit 1
 fi
-# Headers of users' compilers: no name of another library in them.
+# Users' compilers read these headers, so they must not include another library's.
 if grep -rnE '#include[ ]*[<"](Eigen|hdf5|mpi|itk|gdcm|nlohmann|toml|CLI)' "$scratch/prefix/include"; then
   echo "installed_example: a public header includes another library's (above)" >&2
   exit 1
 fi
-# A copy: the project must not find anything beside it.
+# Builds a copy, so that the example finds nothing of the project beside it.
 cp -r "$source_folder" "$scratch/project"
 "$cmake" -S "$scratch/project" -B "$scratch/build" -DCMAKE_PREFIX_PATH="$scratch/prefix" -DCMAKE_BUILD_TYPE=Release \
   -DCMAKE_CXX_COMPILER="$compiler" -DCMAKE_CXX_FLAGS="-Wall -Wextra -Wpedantic -Wconversion -Werror" >/dev/null
 "$cmake" --build "$scratch/build" >/dev/null
 "$scratch/build/example" "$study/AP.af.h5" "$scratch/example.f32"
 
-# The pixels end af-drr's file.
+# The pixels are at the end of af-drr's file.
 bytes=$(stat -c %s "$scratch/example.f32")
 ((bytes > 0)) || { echo "installed_example: no pixels" >&2; exit 1; }
 tail -c "$bytes" "$study/field.mha" >"$scratch/program.f32"
 cmp "$scratch/example.f32" "$scratch/program.f32"
 
-# Errors cross the border between library and program as what they are.
+# Errors keep their type across the border between library and program.
 status=0
 "$scratch/build/example" "$study/study.toml" "$scratch/none.f32" 2>"$scratch/error.txt" || status=$?
 if ((status != 4)) || ! grep -q 'study.toml: is not an HDF5 file' "$scratch/error.txt"; then

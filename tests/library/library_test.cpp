@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The library from outside: its headers alone, against what the programs made (make_library_study).
+// Tests the library by its public headers alone, against what the programs made
+// (make_library_study).
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -96,7 +97,7 @@ TEST(LibraryField, LooksUpTheDrrOfTheProgramInAnAtlas) {
   const Pose between = atlas.frame().pose({2.0, -1.5, 7.0}, kTranslationMm);
   const auto expected = last_floats(study_file("atlas.mha"), atlas.pixel_count());
   EXPECT_EQ(drr_of(atlas, between), expected);
-  // Members are read by whichever thread needs them first, while others read files, too.
+  // Whichever thread needs a member first reads it, while others read files, too.
   const Field shared = Field::open(study_file("AP.atlas.af.h5"), {.threads = 3});
   std::vector<Pose> poses(6, between);
   std::vector<float> stack(poses.size() * shared.pixel_count());
@@ -158,8 +159,8 @@ TEST(LibraryRenderer, GivesTheDerivativesThatTheProgramsOptimiseWith) {
   EXPECT_EQ(values, last_floats(study_file("motion-gradient.f32"), 7 * pixels));
 }
 
-/// Sums over the detector by waves of 14 and 18 pixels, which average the rounding of single pixels
-/// out and feel every motion, against central differences of the sums.
+/// Compares sums over the detector with central differences of the sums. Waves of 14 and 18 pixels
+/// weight the sums, which averages out the rounding of single pixels and responds to every motion.
 TEST(LibraryRenderer, GivesDerivativesByItsParameters) {
   const Rig rig = Rig::read(study_file("rig.toml").string());
   const RayCaster caster(Ct::read(study_file("ct.nii.gz")), rig.camera("LAT"), {.step_mm = 0.1});
@@ -191,7 +192,7 @@ TEST(LibraryRenderer, GivesDerivativesByItsParameters) {
     expected.push_back((moved(kStep) - moved(-kStep)) / (2.0 * kStep));
     found.push_back(weighted(std::span(planes).subspan(k * pixels, pixels)));
   }
-  // Where rays enter and leave the volume their samples slide as it moves, which shifts values, and
+  // As the volume moves, samples slide where rays enter and leave it. This shifts values, and
   // differences over a small step by some percent of the largest.
   constexpr double kTolerance = 0.05;
   for (const std::size_t first : {0U, 3U}) {
@@ -318,7 +319,7 @@ TEST(LibraryCt, SharesVoxelsAndRefusesGridsThatAreNone) {
   grid.size[0] += 1;
   EXPECT_THROW((void)Ct::from_voxels(grid, nullptr, ct.hu()), InputError);
   grid = ct.grid();
-  // Products of 2^64, which wraps to 0, 2^64 and 2^90.
+  // Products of 2^64, 2^64 and 2^90 voxels, which wrap to 0.
   for (const std::array<int, 3>& size : {std::array{1 << 22, 1 << 21, 1 << 21},
                                          {1 << 30, 1 << 30, 16},
                                          {1 << 30, 1 << 30, 1 << 30}}) {
@@ -368,7 +369,8 @@ TEST_P(LibraryRegistrationOf, EndsWhereTheProgramEnds) {
   const Registration found =
       registration_case.run(registration_case.frame().pose({-1.0, 0.5, 2.5}, {0.5, 1.0, 4.0}));
   const nlohmann::json expected = result_of(GetParam());
-  // Preset bone finds no bone's silhouette in ellipsoids, and both say so.
+  // Preset bone finds no bone's silhouette in ellipsoids, and both the library and the program say
+  // so.
   const bool is_found = expected.contains("room_from_ct");
   EXPECT_EQ(is_found, GetParam() != "bone");
   const auto& pose = expected.at(is_found ? "room_from_ct" : "rejected_room_from_ct");
@@ -430,7 +432,7 @@ TEST(LibraryRegistration, LeavesOutTheUncertaintyAndNothingElse) {
   const Pose start = full.frame().pose({-1.0, 0.5, 2.5}, {0.5, 1.0, 4.0});
   const Registration with = full.run(start);
   const Registration without = bare.run(start);
-  // Without a predicted TRE, a lower bound.
+  // Without a predicted TRE, the confidence is a lower bound.
   EXPECT_GT(without.uncertainty.confidence, 0.0);
   EXPECT_LE(without.uncertainty.confidence, with.uncertainty.confidence);
   EXPECT_TRUE(std::isnan(without.uncertainty.tre_95_mm));
@@ -534,7 +536,7 @@ TEST(LibraryRegistration, CasesShareFieldsThatAreOpen) {
     options.opened_fields.emplace(camera, Field::open(path));
   }
   fs::remove_all(folder);
-  // The first needs fewer levels of the fields than the second, the third no more.
+  // The first needs fewer levels of the fields than the second, and the third adds none.
   std::vector<RegistrationCase> cases;
   for (const char* preset : {"fast", "robust", "fast"}) {
     options.preset = preset;
@@ -594,7 +596,7 @@ TEST(LibraryEvaluation, MeasuresPosesAndImages) {
   const CtBox box{{-1.0, -1.0, -1.0}, {1.0, 1.0, 1.0}};
   EXPECT_NEAR(mean_tre_mm(moved, Pose{}, box), 5.0, 1e-12);
   EXPECT_THROW((void)mean_tre_mm(moved, Pose{}, CtBox{}), InputError);
-  // Differences of 0.1 against a maximum of 1: 20 dB.
+  // Differences of 0.1 against a maximum of 1 are 20 dB.
   const std::vector<float> reference = {1.0F, 0.5F, 0.0F};
   const std::vector<float> drr = {0.9F, 0.6F, 7.0F};
   EXPECT_NEAR(psnr_db(drr, reference).value_or(0.0), 20.0, 1e-4);

@@ -26,7 +26,7 @@ void run(const std::string& command) {
   if (result.exit_code != 0) throw std::runtime_error(command + "\n" + result.output);
 }
 
-/// The DRR and its six planes, as the optimisers get them.
+/// Writes the DRR and its six planes, as the optimisers get them.
 void write_motion_gradient(const fs::path& field_path, const fs::path& output) {
   const auto field = af::read_field(field_path, af::Communicator::alone());
   const auto renderer = af::make_field_renderer(field, "linear");
@@ -47,7 +47,8 @@ void write_motion_gradient(const fs::path& field_path, const fs::path& output) {
              static_cast<std::streamsize>(values.size() * sizeof(float)));
 }
 
-/// The levels of a field as its tiles have them, without a filter, [slab][u][v][t][s].
+/// Writes the levels of a field as its tiles have them, without a filter, in the order
+/// [slab][u][v][t][s].
 void write_tile_levels(const fs::path& field_path) {
   auto field = *af::read_field(field_path, af::Communicator::alone());
   field.codebook.filter.reset();
@@ -78,8 +79,8 @@ void make(const fs::path& folder, const std::string& programs) {
   }
   run(programs + "/af-precompute" + study + " --camera AP --material bone" + design +
       (folder / "AP.bone.af.h5").string());
-  // With what a file may hold beyond that: slabs, means, a tile filter, bounds per axis. Viewpoints
-  // are odd in number, so that the last tiles are padded.
+  // This field has what a file may hold beyond that: slabs, means, a tile filter, bounds per axis.
+  // Its viewpoints are odd in number, so that the last tiles are padded.
   run(programs + "/af-precompute" + study +
       " --camera AP --preset standard --max-rotation-deg 5 --max-translation-mm 10"
       " --translation-range-mm ty=-8:12 --slabs 2 --uv-nodes 7 --st-nodes 95 --codewords 256 -o " +
@@ -99,7 +100,7 @@ void make(const fs::path& folder, const std::string& programs) {
   run(programs + "/af-drr --ct " + (folder / "ct.nii.gz").string() + " --rig " +
       (folder / "rig.toml").string() + " --camera LAT" + beam + pose +
       (folder / "cast-beam.mha").string());
-  // Between the angles of two members, so that both are looked up.
+  // The angle lies between those of two members, so that both are looked up.
   run(programs + "/af-drr --field " + atlas +
       " --rotation-deg 2,-1.5,7 --translation-mm 4,-5,6 -o " + (folder / "atlas.mha").string());
   write_motion_gradient(folder / "AP.af.h5", folder / "motion-gradient.f32");

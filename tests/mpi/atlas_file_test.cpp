@@ -70,7 +70,7 @@ std::uint16_t index_of(std::size_t slab, std::size_t tile) {
   return static_cast<std::uint16_t>(hash64(kAtlasSeed, slab, tile) % kCodewords);
 }
 
-/// One block per slab, dealt out over the ranks; the last of several has none.
+/// One block per slab, dealt out over the ranks. The last of several ranks has none.
 std::vector<IndexBlock> my_blocks(const AttenuationAtlas& atlas, const Communicator& world) {
   const FieldLattice lattice = atlas.lattice();
   const std::size_t writers = static_cast<std::size_t>(std::max(1, world.size() - 1));
@@ -112,7 +112,7 @@ void replace_dataset(hid_t file, const field_layout::Dataset& dataset) {
   hdf5::write_dataset(file, dataset, sha256_hex(dataset.bytes));
 }
 
-/// The message of the FileError that `read` gives on this rank; fails the test without one.
+/// The message of the FileError that `read` throws on this rank. Without one the test fails.
 std::string refusal_of(const std::function<void()>& read) {
   try {
     read();
@@ -188,7 +188,7 @@ TEST(AtlasFile, IsNoFieldNorAFieldAnAtlas) {
   const std::string message = refusal_of([&] { read_field(folder / "a.h5", world); });
   EXPECT_NE(message.find("expected attenuation-field, found attenuation-atlas"), std::string::npos)
       << message;
-  // Cut at any length, and what never was one.
+  // Files cut at any length, and files that never were an atlas.
   const auto size = std::filesystem::file_size(folder / "a.h5");
   for (const std::uintmax_t kept : {size - 1, size / 2, size / 8, std::uintmax_t{9}}) {
     if (world.is_root()) {
@@ -216,7 +216,7 @@ TEST(AtlasFile, RefusesAMissingMemberAndADamagedOne) {
     const std::string message = refusal(folder / "a.h5");
     EXPECT_NE(message.find("a.h5"), std::string::npos) << message;
   }
-  // A count that others than the members have.
+  // A count that differs from the number of members.
   for (const int count : {0, 1, 3, 65}) {
     write(small_atlas(), folder / "a.h5");
     edit(folder / "a.h5", [&](hid_t file) {
@@ -239,7 +239,7 @@ TEST(AtlasFile, RefusesACodebookThatIsNotItsOwn) {
       if (dataset.rule.name == "/codebook/codewords") replace_dataset(file, dataset);
   });
   EXPECT_NE(refusal(folder / "a.h5").find("payload_sha256"), std::string::npos);
-  // One with too few codewords for the indices, though all hashes agree.
+  // A file with too few codewords for its indices, although all hashes agree.
   AttenuationAtlas few = small_atlas();
   few.codebook.codewords.resize(3);
   const std::string sha256 = write(few, folder / "b.h5").payload_sha256;
@@ -285,7 +285,7 @@ TEST(AtlasFile, IsOfBoneAloneWhereAllItsMembersAre) {
   atlas.members[1].identity.material = FieldMaterial::All;
   write(atlas, folder / "a.h5");
   EXPECT_NE(refusal(folder / "a.h5").find("/member_1/material"), std::string::npos);
-  world.barrier();  // the folder goes with rank 0
+  world.barrier();  // rank 0 removes the folder
 }
 
 TEST(AtlasFile, RefusesAMemberOfAFileThatHasBecomeAnother) {
@@ -321,7 +321,7 @@ TEST(OpenedField, LooksAnAtlasUpInTheMemberThatHoldsAPose) {
             "atlas of 2 fields, the nearest of AP: the nominal camera");
   const MotionRange box = held.coverage.box(ap, held.identity.frame, held.identity.range);
   EXPECT_GT(box.max_translation_mm(), 1.0);
-  world.barrier();  // the folder goes with rank 0
+  world.barrier();  // rank 0 removes the folder
 }
 
 }  // namespace

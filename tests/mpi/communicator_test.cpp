@@ -48,8 +48,8 @@ TEST(Communicator, GathersPartsOfVeryDifferentSizes) {
               std::vector<std::byte>(size_of(rank), std::byte(rank + 1)));
 }
 
-// To let go of it is no collective call: the ranks that fail at different places, or at none, would
-// wait for each other for ever.
+// Letting go of it is no collective call. If it were, ranks that fail at different places, or not
+// at all, would wait for each other for ever.
 TEST(Communicator, RanksLetGoOfNodeMemoryEachInItsOwnOrder) {
   const Communicator world = Communicator::world();
   const auto make = [&] {
@@ -138,7 +138,7 @@ TEST(Communicator, NodeMemoryFromRankZerosNodeIsFilledByItsRanksTogether) {
   EXPECT_THROW(std::ignore = world.allocate_on_nodes_from_root_together(8, fill), Error);
 }
 
-/// Also where MPI runs: every rank by itself. library_test uses it where MPI is not even
+/// MPI runs here, and every rank is alone all the same. library_test does this without MPI being
 /// initialised.
 TEST(CommunicatorAlone, NeedsNoMpi) {
   const Communicator alone = Communicator::alone();
@@ -177,7 +177,7 @@ TEST(AllOrNone, ThrowsTheLoneRanksErrorEverywhere) {
     EXPECT_EQ(error.exit_code(), ExitCode::Input);
     EXPECT_NE(std::string(error.what()).find("a.toml: size = 7: must be even"), std::string::npos);
     if (world.size() > 1) {
-      const std::string who = "rank " + std::to_string(failing) + " on ";  // and a host
+      const std::string who = "rank " + std::to_string(failing) + " on ";  // a host follows
       EXPECT_EQ(std::string(error.what()).rfind(who, 0), 0u);
     }
   }

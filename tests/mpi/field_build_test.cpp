@@ -26,8 +26,8 @@
 namespace af {
 namespace {
 
-// Made by these tests on one rank with the widest vectors; any rank count, plan and vector width
-// must give the same. From correctly rounded operations only.
+// Made by these tests on one rank with the widest vectors. Any rank count, plan and vector width
+// must give the same, because all operations are correctly rounded.
 constexpr const char* kFrozenPayload =
     "ad07e88283e88fd0d50023839e7e53628036aee29a24d64f809795b9771855c2";
 
@@ -42,7 +42,8 @@ CtVolume small_ct() {
   return box_phantom(grid, {4, 3, 3}, {17, 14, 13}, 400);
 }
 
-/// 7 x 6 viewpoints over 25 x 22 nodes, of which an odd number is stored. No libm.
+/// 7 x 6 viewpoints over 25 x 22 nodes, of which an odd number is stored. Nothing here depends on
+/// libm.
 LightSlab small_light_slab() {
   LightSlab light_slab;
   light_slab.uv_plane_y_mm = 500.0;
@@ -107,7 +108,7 @@ class FieldBuildTest : public testing::Test {
     return {folder, "units", {{"step_mm", "3"}, {"ct_content_sha256", "b"}}, rays_per_unit};
   }
 
-  /// Casts with progress until some units are done, then stops as SIGUSR1 does.
+  /// Casts, keeping progress, until some units are done, then stops as for SIGUSR1.
   void stop_after(const std::filesystem::path& path, std::uint64_t units_per_rank) {
     UnitStore progress(work_in(path), world_);
     std::atomic<std::uint64_t> asked = 0;
@@ -188,7 +189,7 @@ TEST_F(FieldBuildTest, MeanRemovedPayloadIsTheSameOnAnyRankCountPlanAndVectorWid
             kFrozenMeanRemovedPayload);
 }
 
-/// Sixty-three shapes beside means serve better than sixty-three tiles.
+/// Sixty-three shapes and separate means serve better than sixty-three tiles.
 TEST_F(FieldBuildTest, MeanRemovedTilesComeNearerToTheSamples) {
   const auto units = plan_units(light_slab_.lattice(), {kUnitRays});
   const FieldBuild build = build_of(units, nullptr);
@@ -204,7 +205,7 @@ TEST_F(FieldBuildTest, MeanRemovedTilesComeNearerToTheSamples) {
   EXPECT_LT(error_of(48), 0.75 * error_of(0));
 }
 
-/// The weights in the payload depend on neither.
+/// The payload holds the filter's weights, which must depend on neither.
 TEST_F(FieldBuildTest, FilterIsTheSameOnAnyRankCountAndVectorWidth) {
   light_slab_.slabs[0].s.nodes = 65;
   light_slab_.slabs[0].stored_s = {2, 63};
@@ -286,7 +287,7 @@ TEST_F(FieldBuildTest, DecodedFieldStaysNearTheCastSamples) {
           squared += difference * difference;
           squared_signal += static_cast<double>(direct) * static_cast<double>(direct);
         }
-  // 64 codewords for a smooth body: a decoder that mixed up axes or blocks would be off by the
+  // 64 codewords fit a smooth body well. A decoder that mixed up axes or blocks would be off by the
   // signal itself.
   EXPECT_LT(squared, 0.01 * squared_signal);
 }
@@ -360,7 +361,7 @@ TEST_F(FieldBuildTest, ProgressOfRefusedOptionsGivesWayToOthersAndIsUsedByTheSam
   UnitStore(work_in(progress_path), world_).give_way();
   world_.barrier();
   EXPECT_GT(units_found("3"), 0u);
-  EXPECT_THROW(units_found("4"), Error);  // it has been taken up again
+  EXPECT_THROW(units_found("4"), Error);  // it has been taken again
   world_.barrier();
   UnitStore(work_in(progress_path), world_).give_way();
   world_.barrier();
@@ -444,7 +445,7 @@ TEST(TrainingFiles, BytesThatAreNotOfATrainingAreNone) {
   bytes.pop_back();
   EXPECT_FALSE(training_of(bytes).has_value());
   EXPECT_FALSE(training_of({}).has_value());
-  std::fill(bytes.begin(), bytes.end(), std::byte{0xFF});  // sizes that would overflow
+  std::fill(bytes.begin(), bytes.end(), std::byte{0xFF});  // sizes whose product would overflow
   EXPECT_FALSE(training_of(bytes).has_value());
 }
 
@@ -495,7 +496,7 @@ TEST_F(FieldBuildTest, AUnitCastAgainForItsDamagedRecordIsFoundByTheNextRun) {
                        std::ios::in | std::ios::out | std::ios::binary);
     shard.seekp(-1, std::ios::end);
     shard.put('\x5A');
-    // No shards, though they are called so: a folder, and a run that none can follow.
+    // These have names of shards but are none: a folder, and a run number that no run can follow.
     std::filesystem::create_directory(folder_ / "a.h5.progress" / "units.0000-000009.records");
     std::ofstream(folder_ / "a.h5.progress" / "units.9223372036854775807-000000.records") << "x";
   }

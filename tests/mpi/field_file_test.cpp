@@ -99,7 +99,7 @@ std::vector<IndexBlock> all_blocks(const CompressedAttenuationField& field) {
   return blocks;
 }
 
-/// Every rank's part; the last of several ranks has none.
+/// This rank's part of the blocks. The last of several ranks has none.
 std::vector<IndexBlock> dealt(const std::vector<IndexBlock>& blocks, const Communicator& world) {
   const int dealt_to = std::max(1, world.size() - 1);
   std::vector<IndexBlock> mine;
@@ -115,7 +115,7 @@ FieldProvenance some_provenance() {
 
 FieldFileInfo write(const CompressedAttenuationField& field, const std::filesystem::path& path) {
   const Communicator world = Communicator::world();
-  // A program never replaces what it has read.
+  // Removed first, because a program never replaces what it has read.
   test::remove_shared_file(path);
   return write_field(field, dealt(all_blocks(field), world), some_provenance(), path, world);
 }
@@ -123,7 +123,7 @@ FieldFileInfo write(const CompressedAttenuationField& field, const std::filesyst
 /// Runs `edit` on the file on rank 0.
 void edit_file(const std::filesystem::path& path, const std::function<void(hid_t)>& edit) {
   const Communicator world = Communicator::world();
-  world.barrier();  // HDF5 lets nobody write a file that another rank still reads
+  world.barrier();  // HDF5 refuses to write a file that another rank still reads
   if (world.is_root()) {
     const hdf5::Handle file = hdf5::open_file(path, H5F_ACC_RDWR);
     edit(file);
@@ -131,8 +131,8 @@ void edit_file(const std::filesystem::path& path, const std::function<void(hid_t
   world.barrier();
 }
 
-/// The message of the FileError that reading the file gives on this rank; fails the test when there
-/// is none.
+/// The message of the FileError that reading the file throws on this rank. Without one the test
+/// fails.
 std::string refusal(const std::filesystem::path& path) {
   try {
     read_field(path, Communicator::world());
@@ -250,8 +250,8 @@ TEST(FieldFile, MissingBlocksAreNoticedAndLeaveNoFile) {
   const Communicator world = Communicator::world();
   const CompressedAttenuationField field = small_field();
   const auto blocks = all_blocks(field);
-  // The indices that nobody wrote read as 0; drop a block that is not all 0, of the first slab and
-  // of the last one, which other ranks verify.
+  // Indices that nobody wrote read as 0, so a block that is not all 0 is left out. Different ranks
+  // verify the first slab and the last.
   ASSERT_NE(blocks[3].slab, blocks.back().slab);
   for (const std::size_t missing : {std::size_t{3}, blocks.size() - 1}) {
     auto written = blocks;
@@ -307,7 +307,7 @@ CompressedAttenuationField field_of_chunks(int tiles_u, int tiles_v) {
   return field;
 }
 
-/// HDF5 1.10's own metadata cache holds the index of 65536 chunks; it failed beyond.
+/// The default metadata cache of HDF5 1.10 holds the index of 65536 chunks, and fails beyond.
 TEST(FieldFile, HoldsMoreChunksThanFitIntoTheCacheOfHdf5) {
   constexpr int kAlongU = kIndexChunkTilesAlongU;
   constexpr int kTilesU = 288 * kAlongU;
@@ -335,15 +335,15 @@ TEST(FieldFile, TheTestOfManyChunksLeavesNothing) {
   const Communicator world = Communicator::world();
   check_writing_many_chunks(
       field_of_chunks(288 * kIndexChunkTilesAlongU, 256).lattice(), folder / "a.af.h5", world);
-  // A small field is not tested once more: it would fail here.
+  // A small field is not tested: writing to this path would fail.
   check_writing_many_chunks(small_field().lattice(), "/nowhere/a.af.h5", world);
   world.barrier();
   EXPECT_TRUE(std::filesystem::is_empty(folder / ""));
   world.barrier();
 }
 
-/// Left out unless AF_LARGE_FIELD_GB says how many GB of indices to write, verify and look up:
-/// the node needs as much memory for the last. Every unit of 32 viewpoint tiles along u has 1 MiB.
+/// Skipped unless AF_LARGE_FIELD_GB says how many GB of indices to write, verify and look up.
+/// Looking up needs as much memory on the node. Every unit of 32 viewpoint tiles along u has 1 MiB.
 TEST(FieldFile, HoldsALargeField) {
   const char* const gigabytes = std::getenv("AF_LARGE_FIELD_GB");
   if (gigabytes == nullptr) GTEST_SKIP() << "AF_LARGE_FIELD_GB is not set";
@@ -372,7 +372,7 @@ TEST(FieldFile, HoldsALargeField) {
   const FieldFileInfo info =
       write_field(field, next_blocks, some_provenance, folder / "large.af.h5", world);
   EXPECT_GT(info.payload_bytes, static_cast<std::uint64_t>(std::stod(gigabytes) * 0.99e9));
-  // Read back as af-drr does, all of it into the node's memory, and looked up in every unit.
+  // As in af-drr, all of it is read into the node's memory, and every unit is looked up.
   const auto read = read_field(folder / "large.af.h5", world);
   std::uint64_t wrong = 0;
   for (int unit = 0; unit < units; ++unit)
@@ -411,20 +411,20 @@ std::vector<hdf5::ChunkShape> chunks_of(
 TEST(FieldFile, ChunksGrowAlongVOnlyWhereThereWouldBeTooMany) {
   using hdf5::ChunkShape;
   EXPECT_EQ(chunks_of({{32, 32, 128, 118}})[0], (ChunkShape{8, 1, 32, 64}));
-  // As many planes of equal u as are 32 MiB.
+  // A chunk spans as many planes of equal u as make 32 MiB.
   EXPECT_EQ(chunks_of({{64, 64, 512, 128}})[0], (ChunkShape{4, 1, 32, 64}));
   EXPECT_EQ(chunks_of({{64, 64, 512, 320}})[0], (ChunkShape{1, 1, 32, 64}));
-  // Tiles 2 to 4 of 7, or 1 to 3 of 5, lie about the nominal viewpoint: one chunk holds them.
+  // Tiles 2 to 4 of 7, or 1 to 3 of 5, surround the nominal viewpoint. One chunk holds them.
   EXPECT_EQ(chunks_of({{7, 7, 144, 102}})[0], (ChunkShape{5, 1, 32, 64}));
   EXPECT_EQ(chunks_of({{5, 4, 3, 7}})[0], (ChunkShape{4, 1, 3, 7}));
   EXPECT_EQ(chunks_of({{2, 4, 3, 7}})[0], (ChunkShape{2, 1, 3, 7}));
   // 2^20 chunks, and one column more.
   EXPECT_EQ(chunks_of({{128, 128, 1024, 512}})[0], (ChunkShape{1, 4, 32, 64}));
   EXPECT_EQ(chunks_of({{128, 128, 1024, 513}})[0], (ChunkShape{1, 8, 32, 64}));
-  // Slabs count together.
+  // The chunks of all slabs count.
   EXPECT_EQ(chunks_of(std::vector(64, std::vector<std::uint64_t>{64, 64, 600, 400}))[63],
             (ChunkShape{1, 64, 32, 64}));
-  // No more viewpoints along v than there are; chunks of 2^20 elements at most.
+  // A chunk spans no more viewpoints along v than there are, and at most 2^20 elements.
   EXPECT_EQ(chunks_of({{2048, 3, 4096, 2048}})[0], (ChunkShape{1, 3, 256, 64}));
   EXPECT_EQ(chunks_of({{1024, 2048, 1024, 512}})[0], (ChunkShape{1, 512, 32, 64}));
 }
@@ -500,7 +500,7 @@ TEST(FieldFile, ADamagedByteIsRefusedOrWithoutEffect) {
     try {
       FieldFileInfo info;
       read_field(folder / "bad", world, &info);
-      // Then the byte lay in unused space, in an attribute nobody relies on, or in provenance.
+      // The byte lay in unused space, in an attribute that no reader uses, or in the provenance.
       EXPECT_EQ(info.payload_sha256, sound.payload_sha256);
     } catch (const Error& error) {
       EXPECT_EQ(error.exit_code(), ExitCode::File) << error.what();
@@ -630,7 +630,7 @@ TEST(FieldFile, RefusesChunksOfMoreThanAMillionElements) {
   const auto refusal_of = [&](const std::vector<hsize_t>& chunk) {
     return refusal_with(
         folder / "a.af.h5", "/geometry/uv_nodes", [&](hid_t file, const char* name) {
-          // A chunk may be larger than what it holds where that may grow.
+          // A chunk may be larger than its dataset only where the dataset may grow.
           const auto rank = static_cast<int>(chunk.size());
           const std::vector<hsize_t> extents(chunk.size(), 2);
           const std::vector<hsize_t> limits(chunk.size(), H5S_UNLIMITED);
@@ -651,7 +651,7 @@ TEST(FieldFile, RefusesChunksOfMoreThanAMillionElements) {
     EXPECT_NE(message.find("/geometry/uv_nodes"), std::string::npos) << message;
     EXPECT_NE(message.find("chunks of at most 1048576 elements"), std::string::npos) << message;
   }
-  // At the limit it is refused for something else: nothing has been written into it.
+  // At the limit the chunk passes. The file is refused all the same, because the dataset is empty.
   const std::string message = refusal_of({kMost});
   EXPECT_EQ(message.find("chunks"), std::string::npos) << message;
 }
@@ -731,7 +731,7 @@ std::vector<IndexBlock> blocks_with_means(const CompressedAttenuationField& fiel
   return blocks;
 }
 
-/// Means of more tiles along t than kMeanRunTiles, so that differences begin anew.
+/// Means of more tiles along t than kMeanRunTiles, so that a second run of differences begins.
 TEST(FieldFile, HoldsMeansBesideTheIndices) {
   const test::SharedFolder folder;
   const Communicator world = Communicator::world();
@@ -758,7 +758,7 @@ TEST(FieldFile, HoldsMeansBesideTheIndices) {
             ASSERT_EQ(read->slabs[k].indices[next++], 96 * index_at({a, b, c, d}, k));
         }
   }
-  // As the format says: [u][v][t][s], differences along t that begin anew.
+  // As the format says: in the order [u][v][t][s], with runs of differences along t.
   const hdf5::Handle file = hdf5::open_file(path, H5F_ACC_RDONLY);
   const hdf5::Handle dataset(
       H5Dopen2(file, "/field/slab_0/means", H5P_DEFAULT), H5Dclose, "H5Dopen2");
@@ -821,7 +821,7 @@ TEST(FieldFile, RefusesAFilterThatIsNoneOrNotStated) {
   filter.weights[3][4] = std::numeric_limits<float>::infinity();
   write(filter);
   expect_refused("tile_filter: weights must be within 1e6 of 0");
-  // Without it tiles would be taken as they are.
+  // Without the filter, a reader would use the tiles unfiltered.
   write(some_filter());
   edit_file(folder / "a.af.h5",
             [](hid_t file) { H5Ldelete(file, "/codebook/tile_filter", H5P_DEFAULT); });
@@ -843,7 +843,7 @@ TEST(FieldFile, RefusesMeansThatMakeNoSense) {
   const auto expect_named = [](const std::string& message, const std::string& text) {
     EXPECT_NE(message.find(text), std::string::npos) << message;
   };
-  // Within the second row of the first block.
+  // The index is spoilt within the second row of the first block.
   expect_named(refusal_of([](auto&, auto& blocks) {
                  auto& block = blocks.front();
                  block.indices[static_cast<std::size_t>(block.tile_count[3])] = 97;
@@ -873,7 +873,8 @@ TEST(FieldFile, HoldsARangeOfBoundsBesideItsSymmetricPart) {
   field.identity.range = {0.1, 5.0};
   const std::string symmetric = write(field, folder / "a.af.h5").payload_sha256;
   field.identity.range = range_of_bounds();
-  // The payload states the part of two numbers: it is the one of a field of that range.
+  // The payload states only the symmetric part, so it equals that of a field with this symmetric
+  // range.
   EXPECT_EQ(write(field, folder / "b.af.h5").payload_sha256, symmetric);
   FieldFileInfo info;
   const auto read = read_field(folder / "b.af.h5", Communicator::world(), &info);
@@ -883,7 +884,7 @@ TEST(FieldFile, HoldsARangeOfBoundsBesideItsSymmetricPart) {
   EXPECT_EQ(read->identity.range.high.translation_mm, field.identity.range.high.translation_mm);
   EXPECT_EQ(read_field_header(folder / "b.af.h5").identity.range.low.rotation_rad.z(), -0.5);
   EXPECT_TRUE(read_field(folder / "a.af.h5", Communicator::world())->identity.range.is_symmetric());
-  // Without the bounds, as a tool that copies what it knows leaves them.
+  // The bounds are gone, as after a tool that copies only what it knows.
   edit_file(folder / "b.af.h5", [&](hid_t file) { H5Ldelete(file, "/range", H5P_DEFAULT); });
   EXPECT_EQ(read_field_header(folder / "b.af.h5").identity.range.max_rotation_rad(), 0.1);
 }
@@ -952,7 +953,7 @@ TEST(FieldFile, RefusesHugeExtentsBeforeItAsksForMemory) {
   });
   const std::string message = refusal(folder / "a.af.h5");
   EXPECT_NE(message.find("a file of"), std::string::npos) << message;
-  // Counts that would overflow a product, or that are negative.
+  // Counts whose product would overflow, or that are negative.
   for (const std::array<int, 2>& nodes : {std::array{2000000000, 2000000000}, {-6, 24}, {1, 24}}) {
     CompressedAttenuationField odd = small_field();
     odd.light_slab.slabs[0].s.nodes = nodes[0];

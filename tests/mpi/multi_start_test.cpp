@@ -78,7 +78,7 @@ TEST(RegisterStarts, CopesWithFewerStartsThanRanks) {
   const UnfinishedWork work = {folder / "p", "registrations", {}};
   const auto records = register_starts(registration, some_starts(small, 1), work, world);
   EXPECT_EQ(records.size(), world.is_root() ? 1U : 0U);
-  // One start leaves nothing to be kept.
+  // With one start there is no unfinished work to keep.
   EXPECT_FALSE(std::filesystem::exists(work.folder));
   EXPECT_TRUE(register_starts(registration, {}, work, world).empty());
 }

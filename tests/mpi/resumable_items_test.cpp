@@ -26,13 +26,13 @@ std::vector<std::int64_t> first_items(std::int64_t count) {
   return items;
 }
 
-/// As many bytes as the item's number, modulo 100, each its lowest 8 bits.
+/// The item's number modulo 100 gives the count of bytes; each holds its lowest 8 bits.
 std::vector<std::byte> result_of(std::int64_t item) {
   return std::vector<std::byte>(static_cast<std::size_t>(item % 100),
                                 static_cast<std::byte>(item & 0xFF));
 }
 
-/// Every result that rank 0 is given; each must be the item's own.
+/// How often rank 0 is given each item's result, which must be the item's own.
 std::map<std::int64_t, int> visited(const ResumableItems& items) {
   std::map<std::int64_t, int> times;
   items.visit([&](std::int64_t item, std::span<const std::byte> result) {
@@ -87,7 +87,7 @@ TEST(ResumableItems, DoesOnlyWhatNoEarlierRunFinished) {
   }
   ResumableItems items(work, world);
   EXPECT_EQ(completed(items, first_items(40)), 40U - 3U);
-  // Item 40 was not asked for this time.
+  // Item 40 was done earlier, but not asked for this time.
   if (world.is_root()) {
     EXPECT_EQ(visited(items).size(), 40U);
   }
@@ -108,8 +108,8 @@ TEST(ResumableItems, KeepsWhatWasFinishedBeforeAFailure) {
     EXPECT_THROW(items.complete(first_items(50), "", fails_at_20), Error);
   }
   world.sum(finished);
-  // Items are handed out in order: rank 0 or others had those before the 20th, but for the blocks
-  // of ranks that were not yet asked for.
+  // Items are handed out in order, so those before the 20th were out, but for blocks that ranks had
+  // not yet asked for.
   ASSERT_GT(finished[0], 0U);
   ResumableItems items(work, world);
   EXPECT_EQ(completed(items, first_items(50)), 50U - finished[0]);

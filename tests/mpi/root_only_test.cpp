@@ -15,7 +15,8 @@
 namespace af {
 namespace {
 
-// A value of rank 0 is not taken for one that every rank has, nor is a rank's own for a shared one.
+// A value of rank 0 does not pass for one that every rank has, nor a rank's own value for a shared
+// one.
 static_assert(!std::is_convertible_v<RootOnly<int>, int>);
 static_assert(!std::is_constructible_v<Shared<int>, int>);
 static_assert(!std::is_constructible_v<Shared<int>, RootOnly<int>>);
@@ -39,7 +40,7 @@ int failing() {
   throw InputError("size", "7", "must be even", "a.toml");
 }
 
-/// Calls `collective`, which must throw what failing() throws on rank 0, on this rank.
+/// Calls `collective`. On every rank it must throw what failing() throws on rank 0.
 template <typename Collective>
 void expect_failure_everywhere(Collective&& collective) {
   const Communicator world = Communicator::world();
@@ -104,7 +105,7 @@ TEST(RootOnly, CanBeReadOnRankZeroAlone) {
   }
 }
 
-/// Of every rank by itself: each is rank 0 of its group.
+/// Every rank is rank 0 of a group of its own.
 TEST(RootOnly, OfAProcessAloneIsItsOwn) {
   const Communicator world = Communicator::world();
   const int rank = on_root(Communicator::alone(), [&] { return world.rank(); }).share();

@@ -29,7 +29,7 @@ Provenance some_provenance() {
   return {"af-test", "af-test --fast", "fast = true\n", 3, Communicator::world().size(), {}};
 }
 
-/// What is where the file system says so on rank 0, on every rank.
+/// Whether the path exists for rank 0. Every rank gets the answer.
 bool is_there(const std::filesystem::path& path) {
   const Communicator world = Communicator::world();
   std::array<std::uint64_t, 1> found{world.is_root() && std::filesystem::exists(path) ? 1U : 0U};
@@ -41,7 +41,7 @@ std::vector<std::byte> result_of(std::int64_t item) {
   return {static_cast<std::byte>(item)};
 }
 
-/// Does five items in OUT.progress: how many earlier runs had not done.
+/// Does five items in OUT.progress. Returns how many of them earlier runs had not done.
 std::uint64_t done_in(const RunFolder& run, const DecidingValues& decides = kDecides) {
   const Communicator world = Communicator::world();
   ResumableItems items(run.unfinished("rows", decides), world);

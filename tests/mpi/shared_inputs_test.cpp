@@ -39,7 +39,7 @@ TEST(SharedInputs, StudyAndRigAreReadByRankZeroAlone) {
     write_text_file(folder / "rig.toml", rig_to_toml(rig));
     write_text_file(folder / "study.toml", kStudy);
   }
-  // Nothing is there for the others.
+  // The other ranks have no file to read.
   const Shared<Study> study = shared_study(
       world.is_root() ? folder / "study.toml" : std::filesystem::path("/nowhere/study.toml"),
       world);
@@ -48,7 +48,8 @@ TEST(SharedInputs, StudyAndRigAreReadByRankZeroAlone) {
   ASSERT_EQ(study->cases.size(), 1U);
   EXPECT_EQ(study->cases.front().center_ct_mm.x(), 0.1);
   EXPECT_EQ(study->cases.front().views.front().roi.height, 201);
-  // Whatever the file says, and its lines: a member that is not sent would be missing here.
+  // This holds everything that the file says, and its lines. A member that is not sent would be
+  // missing here.
   const Study read = read_study(folder / "study.toml");
   EXPECT_EQ(study_to_toml(study, {}), study_to_toml(read, {}));
   EXPECT_EQ(study->path, read.path);

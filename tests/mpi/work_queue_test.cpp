@@ -33,7 +33,7 @@ TEST(WorkQueue, DoesEveryItemExactlyOnce) {
 TEST(WorkQueue, LongItemsOnRankZeroDoNotStarveOthers) {
   const Communicator world = Communicator::world();
   if (world.size() < 2) GTEST_SKIP() << "needs two ranks";
-  // Every item takes 250 times longer on rank 0: the others must do most of them meanwhile.
+  // Every item takes 250 times longer on rank 0, so the others must do most of them meanwhile.
   std::vector<std::uint64_t> items{0};
   for_each_item(world, 40, [&](std::int64_t) {
     std::this_thread::sleep_for(std::chrono::milliseconds(world.is_root() ? 500 : 2));
@@ -77,7 +77,7 @@ TEST(WorkQueue, FailureOfTheReportOfProgressIsThrownOnEveryRank) {
 TEST(BlockSize, ShrinksTowardsTheEndAndLastsTwoSecondsAtMost) {
   // Nothing is known yet.
   EXPECT_EQ(block_size(1000000, 0, 10, 0.0), 1);
-  // 10 ranks did 5000 items of 2 ms in one second: 1000 of them take a rank two seconds.
+  // 10 ranks did 5000 items of 2 ms in one second. One rank takes two seconds for 1000 of them.
   EXPECT_EQ(block_size(1000000, 5000, 10, 1.0), 1000);
   // A quarter of a rank's share of 4000 items is 100.
   EXPECT_EQ(block_size(4000, 5000, 10, 1.0), 100);

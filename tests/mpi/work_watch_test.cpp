@@ -27,7 +27,7 @@ namespace {
 using testing::HasSubstr;
 
 constexpr double kLimitMinutes = 0.4 / 60.0;
-constexpr double kLongLimitMinutes = 1.0 / 60.0;  // many steps, on a busy machine, too
+constexpr double kLongLimitMinutes = 1.0 / 60.0;  // many steps, even on a busy machine
 constexpr std::chrono::milliseconds kStep{50};
 constexpr int kSteps = 40;  // well above any limit here
 
@@ -72,8 +72,8 @@ std::uint64_t sum_on_host(const Communicator& node, std::uint64_t value) {
   return all[0];
 }
 
-/// What watchdogs say, counted where all ranks of a host see it: tests wait for it, however long a
-/// busy machine lets them.
+/// Counts what watchdogs say where all ranks of a host see it. Tests wait for that, however long it
+/// takes on a busy machine.
 class Reports {
  public:
   /// Collective.
@@ -91,7 +91,8 @@ class Reports {
     };
   }
   [[nodiscard]] int of_host() const { return *of_host_; }
-  /// Once the watchdog is gone: of this rank, empty when it was another.
+  /// What this rank's watchdog said, empty when another spoke. To be read once the watchdog is
+  /// gone.
   [[nodiscard]] const std::string& said() const { return said_; }
 
   void wait_for_one() const {
@@ -121,7 +122,7 @@ TEST(WorkWatch, NamesTheRankThatIsStuckNotThoseThatWaitForIt) {
   const bool is_host_of_stuck = sum_on_host(node, world.rank() == stuck ? 1 : 0) == 1;
   if (is_host_of_stuck) {
     EXPECT_EQ(reports.of_host(), 1);
-  } else {  // The job, which would have ended, goes on here: then the other hosts speak up, too.
+  } else {  // Here the job goes on instead of ending, so the other hosts may report, too.
     EXPECT_LE(reports.of_host(), 1);
   }
   if (reports.said().empty()) return;
@@ -152,7 +153,7 @@ TEST(WorkWatch, IsSilentWhileEverybodyMakesProgress) {
       }
     };
     make_steps(kSteps);
-    // Waiting for others, who work, is no stall either.
+    // Waiting for others that work is no stall either.
     if (world.is_root()) make_steps(kSteps / 2);
     world.barrier();
   }

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# What a user meets who starts from nothing: on a Debian that holds nothing else (debootstrap, variant minbase), the two
-# commands of README.md from a clone of the last commit; then the Debian packages of that build, on a second such Debian.
-# Needs root, debootstrap, git and Debian's mirror.
+# Does what a user does who starts from nothing. On a bare Debian (debootstrap, variant minbase) it runs the two commands of
+# README.md in a clone of the last commit. On a second bare Debian it then tries the packages of that build. Needs root,
+# debootstrap, git and Debian's mirror.
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
 source "$(dirname "${BASH_SOURCE[0]}")/../../jobs/lib.sh"
@@ -37,7 +37,7 @@ for tool in debootstrap git; do
   command -v "$tool" >/dev/null || die 77 "$tool is not installed"
 done
 
-# Whatever is mounted or started goes with this process.
+# Mounts and processes end with this process.
 if [[ -z "${AF_IN_NAMESPACE:-}" ]]; then
   AF_IN_NAMESPACE=1 exec unshare --mount --pid --fork --kill-child --propagation private \
     "$0" "$release" ${systems:+--root "$systems"}
@@ -85,14 +85,14 @@ finish() {
   exit "$status"
 }
 
-# make_bare SYSTEM: a Debian that holds nothing else, with a plain user.
+# make_bare SYSTEM: installs a bare Debian with a plain user.
 make_bare() {
   mkdir -p "$1" &&
     debootstrap --variant=minbase "$release" "$1" "${AF_DEBIAN_MIRROR:-http://deb.debian.org/debian}" &&
     chroot "$1" useradd --create-home --shell /bin/bash guest
 }
 
-# enter SYSTEM: makes it, and makes it ready for commands.
+# enter SYSTEM: installs it if needed, and mounts what commands need.
 enter() {
   [[ -e "$1/home/guest" ]] || step "bare system for the ${1##*/}" make_bare "$1"
   mount -t proc proc "$1/proc"

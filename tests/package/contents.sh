@@ -27,7 +27,7 @@ holds() {
   done
   if grep -v -e '^\./$' -e '^\./usr/' "$scratch/files"; then fail "$package holds files outside of /usr"; fi
 }
-# depends PACKAGE WORD...: the package depends on what begins so.
+# depends PACKAGE WORD...: the package depends on packages whose names begin with these words.
 depends() {
   local package=$1 word
   dpkg-deb --field "$scratch"/packages/"$package"_*.deb Depends | tr ',' '\n' | sed 's/^ *//' >"$scratch/depends"
@@ -52,7 +52,7 @@ if [[ -n "$library" ]]; then
   depends libattenuation-fields-dev "$library"
 fi
 
-# They start from where they are unpacked.
+# Programs and module must start from where they are unpacked.
 for package in "$scratch"/packages/*.deb; do dpkg-deb --extract "$package" "$scratch/root"; done
 for program in "${programs[@]}"; do
   "$scratch/root/usr/bin/$program" --version >"$scratch/version" || fail "$program does not start"
@@ -65,8 +65,8 @@ if compgen -G "$scratch/packages/python3-attenuation-fields_*.deb" >/dev/null; t
     PYTHONPATH="$scratch/root/usr/lib/python3/dist-packages" /usr/bin/python3 -B -c 'import attenuation_fields' || fail "the Python module does not load"
 fi
 
-# Left out: who to write to is for whoever makes packages to say (AF_PACKAGE_CONTACT), and CPack 3.25 calls ldconfig when
-# it installs, instead of by a trigger.
+# These tags are left out. Whoever makes packages names the contact (AF_PACKAGE_CONTACT). CPack 3.25 calls ldconfig in a
+# script, where lintian expects a trigger.
 known=bogus-mail-host,bogus-mail-host-in-debian-changelog,lacks-ldconfig-trigger,no-shlibs
 if command -v lintian >/dev/null; then
   lintian --allow-root --fail-on error --suppress-tags "$known" "$scratch"/packages/*.deb >"$scratch/lintian" 2>&1 || {

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Runs the commands of a page, so that a reader can.
+"""Runs the commands of a page, to show that a reader can.
 
 Usage: page_commands.py --run PAGE PROGRAMS [DATA] runs all ```sh and ```python blocks of a page in one scratch folder
        page_commands.py --data DATA PROGRAMS      makes the small data of all pages once, in a new folder DATA
@@ -27,7 +27,7 @@ EXCUSE = "*Not run by the tests:"
 
 
 def blocks_of(page):
-    """(kind, first line's number, text, the first line of words behind it) of each fenced block."""
+    """(kind, number of the first line, text, the first line that is not empty after it) of each fenced block."""
     lines = page.read_text(encoding="utf-8").splitlines()
     blocks, begin, kind = [], None, ""
     for number, line in enumerate(lines):
@@ -47,7 +47,7 @@ def pages_below(root):
 
 
 def known_options(root):
-    """The options of each program, by docs/reference, which is compared with the programs."""
+    """The options of each program, from docs/reference, which another test compares with the programs."""
     options = {}
     for page in (root / "docs" / "reference").glob("af-*.md"):
         rows = [line for line in page.read_text(encoding="utf-8").splitlines() if line.startswith("| `-")]
@@ -56,7 +56,7 @@ def known_options(root):
 
 
 def unknown_options(text, options):
-    """Options of our programs' commands that the programs do not have."""
+    """Options in commands of our programs that the programs do not have."""
     for command in re.split(r"[|;&\n]+", re.sub(r"#.*", "", text.replace("\\\n", " "))):
         program = re.search(r"\baf-[a-z]+\b", command)
         if program and program.group() in options:

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Puts what our pages name into a folder: ct.nii.gz, rig.toml, study.toml, A.mha and B.mha.
+"""Puts the files that our pages name into a folder: ct.nii.gz, rig.toml, study.toml, A.mha and B.mha.
 
 Usage: small_data.py FOLDER [cam01.txt] [results/]
 
-They are the study that af-simulate, which must be on the PATH, makes of its phantom of a spine, for the cameras of the
-shipped C-arm, here called A and B; what is there already stays. On demand also the cameras as MayaCam's files cam01.txt
-and cam02.txt, and the results of a registration of the study.
+af-simulate, which must be on the PATH, makes them from its phantom of a spine, for the cameras of the shipped C-arm,
+here called A and B. Existing files stay. On demand there are also the cameras as MayaCam's files cam01.txt and
+cam02.txt, and the results of a registration of the study.
 """
 import shutil
 import subprocess

@@ -15,8 +15,8 @@ struct CasterAccuracy {
   std::size_t grid_bytes = 0;
 };
 
-/// Casts `rows` random rows of (s,t) nodes, each from a random viewpoint, of the field with the
-/// paper's parameters; I_max is the largest reference value among them.
+/// Casts `rows` random rows of (s,t) nodes of a field with the paper's parameters, each from a
+/// random viewpoint. I_max is the largest reference value among them.
 CasterAccuracy measure_caster_accuracy(const AttenuationVolume& volume,
                                        const CameraGeometry& camera,
                                        const PoseFrame& frame,

@@ -46,13 +46,13 @@ TEST(RayCaster, AgreesWithItksRayCasterOnARealCt) {
     const std::vector<float> by_itk = itk->cast(test::itk_fan_of(fan));
     std::vector<float> ours(by_itk.size());
     fine.cast(fan, ours);
-    // ITK interpolates bilinearly on one voxel plane per crossing, a rule that on smooth tissue
-    // differs from the fine trilinear integral by far less than one sample: mu * step = 0.02 * 1.5
-    // mm, times 5 % curvature.
+    // ITK interpolates bilinearly on one voxel plane per crossing. On smooth tissue this differs
+    // from the fine trilinear integral by far less than one sample: mu * step = 0.02 * 1.5 mm,
+    // times 5 % curvature.
     constexpr double kMedianDifference = 1.5e-3;
     EXPECT_LT(median_difference(ours, by_itk), kMedianDifference);
-    // It also cuts a ray's ends to whole planes, which loses up to one sample of bone (0.05 * 1.5
-    // mm = 0.075 of U = 5) where this CT ends in the neck: should a tenth of the rays lose half of
+    // It also cuts a ray's ends to whole planes. Where this CT ends in the neck, that loses up to
+    // one sample of bone (0.05 * 1.5 mm = 0.075 of U = 5). If a tenth of the rays lose half of
     // that, 52 dB are left. A frame shifted by half a voxel, the usual mistake, costs far more.
     constexpr double kLeastDb = 52.0;
     EXPECT_GT(psnr(ours, by_itk)->psnr_db, kLeastDb);

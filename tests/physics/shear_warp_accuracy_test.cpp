@@ -8,11 +8,11 @@
 namespace af {
 namespace {
 
-// A caster may cost a field 0.1 dB. Errors that add in squares may then be 0.1 dB * ln(10) / 10 =
-// 2.3 % (-16.4 dB) of the field's own: 75 dB are enough for fields of up to 58 dB, and those of the
+// A caster may cost a field 0.1 dB. Its squared error may then be 0.1 dB * ln(10) / 10 = 2.3 %
+// (-16.4 dB) of the field's own. So 75 dB are enough for fields of up to 58 dB, and those of the
 // skull reach some 50.
 constexpr double kLeastDb = 75.0;
-// As many as caster_accuracy takes.
+// caster_accuracy takes as many.
 constexpr int kRows = 400;
 
 CtVolume skull() {

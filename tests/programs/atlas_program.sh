@@ -63,7 +63,7 @@ for caster in shear-warp trilinear; do
   done
 done
 
-# Killed while it casts, and run again on another number of ranks; another orbit in between is refused.
+# A run is killed while it casts, and continued on another number of ranks. Another orbit in between is refused.
 slow=("${orbit[@]}" --caster trilinear --step-mm 0.02)
 "$mpiexec" -n 2 --oversubscribe "$program" "${slow[@]}" -o slow.h5 >slow.txt 2>slow.err &
 job=$!
@@ -87,13 +87,13 @@ grep -q 'resumed' slow.err || fail "nothing was resumed: $(cat slow.err)"
 "$program" "${slow[@]}" -o whole.h5 --no-checkpoint >whole.txt 2>/dev/null
 [[ $(hash_of slow.txt) == "$(hash_of whole.txt)" ]] || fail 'the resumed atlas differs'
 
-# What it is, and what it covers.
+# af-inspect says what an atlas is and what it covers.
 "$programs/af-inspect" one.h5 >inspect.txt || fail 'af-inspect refuses an atlas'
 for word in 'one.h5: atlas' 'AP_z-40' "covers 100 % of camera AP's rays within 10"; do
   grep -q -- "$word" inspect.txt || fail "af-inspect says nothing of '$word': $(cat inspect.txt)"
 done
 
-# DRRs at poses that no single field of this range holds: a camera at -40 degrees sees what a CT turned by 40 shows.
+# No single field of this range holds these poses. A camera at -40 degrees sees what a CT turned by 40 degrees shows.
 drr=("$programs/af-drr" --field one.h5)
 for angle in 40 12 0 -20; do
   "${drr[@]}" --rotation-deg "0,0,$angle" -o "at$angle.mha" >/dev/null || fail "af-drr at $angle degrees"
@@ -114,8 +114,8 @@ for file in field single; do
 done
 cmp field.mha single.mha || fail 'an atlas of one camera gives other DRRs than its field'
 
-# Registration through an atlas of several slabs, by cameras that stand between its members: as near to the true pose as
-# through each camera's own field, which is a sixth of the 3-mm voxels.
+# Registers through an atlas of several slabs, with cameras that stand between its members. It must come as near to the true
+# pose as through each camera's own field: a sixth of the 3-mm voxels.
 turned_camera() {
   awk -v name="$1" -v degrees="$2" 'BEGIN {
     a = degrees * atan2(0, -1) / 180; c = cos(a); s = sin(a); x = -151.8046875; y = 370

@@ -109,7 +109,7 @@ of_ct 3 'origin = (0, 1e+300, 0) mm' 'origin at 1e300 mm' huge-offset.mha
 of_ct 3 'HU must be within 1e6' 'HU of 1e30' huge-hu.mha
 
 printf -- '--- no file ---\n'
-# What would be waited for, or never ends; each command ends by itself long before the limit.
+# These would be waited for, or never end. Each command must end by itself long before the limit.
 mkfifo pipe
 ln -s loop loop
 long_name=$(printf 'x%.0s' {1..303})
@@ -152,7 +152,7 @@ of_rig 3 'pixel_spacing' 'unknown key (typo)' "$(edited rig.toml '0,/^pixel_spac
 of_rig 3 'source_point' 'source at 1e300 mm' "$(edited rig.toml '0,/^source_point = .*/s//source_point = [0, 1e300, 0]/')"
 of_rig 3 'pixel_spacing_mm' 'pixels of 1e300 mm' "$(edited rig.toml '0,/^pixel_spacing_mm = .*/s//pixel_spacing_mm = [1e300, 3]/')"
 of_rig 4 'c-arm-9in' 'unknown shipped rig' c-arm-9in
-# Cameras of other programs: af-convert is named, and the command for it.
+# For cameras of other programs the message names af-convert and the command.
 printf 'image size\n64,48\n' >'cam 1.txt'
 of_rig 3 "af-convert 'cam 1.txt' -o rig.toml" 'MayaCam' 'cam 1.txt'
 of_rig 3 "af-convert 'cam 1.txt' valid/rig.toml -o rig.toml" 'several files' 'cam 1.txt,valid/rig.toml'
@@ -283,7 +283,8 @@ row 3 'is a study' 'reading of a CT to inspect a study' "$bin/af-inspect" valid/
 row 4 'LAT.af.h5' 'field of another camera' "${register[@]}" --field AP=LAT.af.h5 --field LAT=AP.af.h5
 head -c 20000 AP.af.h5 >cut.af.h5
 row 4 'cut.af.h5' 'truncated field' "$bin/af-drr" --field cut.af.h5 -o out/drr.mha
-# Within the codewords of a field that is large enough to be mostly these; between their chunks HDF5 leaves room for less.
+# Damages the codewords. The field is so large that it consists mostly of them, and HDF5 leaves less room between their
+# chunks than this overwrites.
 mapfile -t larger < <(small --uv-nodes 24 --st-nodes 96 --codewords 256)
 "$bin/af-precompute" "${larger[@]}" --study valid/study.toml --camera AP -o larger.af.h5 >message.txt 2>&1
 bytes=$(stat --format %s larger.af.h5)
@@ -322,7 +323,7 @@ limited() { (
 ); }
 # MPI itself needs files of a few megabytes.
 row 4 'cannot be written' 'DRRs that the disk cannot hold' limited 6000 "$bin/af-drr" --ct valid/ct.nii.gz --rig c-arm-12in --camera AP --poses forty.csv -o out/drrs.mha
-# Of a terminal or a file that takes no more.
+# Standard output may be a terminal or a file that takes no more.
 full() { "$@" >/dev/full; }
 row 4 'standard output: cannot be written' 'a report onto a full disk' full "$bin/af-inspect" AP.af.h5
 row 4 'standard output: cannot be written' 'JSON onto a full disk' full "$bin/af-inspect" --json AP.af.h5

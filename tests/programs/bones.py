@@ -83,7 +83,7 @@ def poses_of(folder):
 
 
 def mean_distance_mm(pose, other):
-    """Over the corners of the target box."""
+    """The mean distance of the target box's corners in both poses."""
     low, high = np.array(bone_scenes.TARGET_BOX_CT, float)
     corners = np.stack(np.meshgrid(*zip(low, high)), axis=-1).reshape(-1, 3)
     return np.linalg.norm(corners @ (pose - other)[:3, :3].T + (pose - other)[:3, 3], axis=1).mean()
@@ -179,19 +179,19 @@ def far():
         run(BIN / "af-register", *wrist_case(bone), "--starts", FOLDER / f"{bone}.csv", "-o", FOLDER / f"{bone}-far")
         rows = list(csv.DictReader(open(FOLDER / f"{bone}-far/registrations.csv")))
         for is_right in (True, False):
-            # Other ends have a fifth less.
+            # Wrong ends have a similarity that is a fifth lower.
             ends = [row for row in rows if (float(row["similarity"] or "-1") > 0.98 * best) == is_right]
             for verdict in ("found", "doubtful", "not found"):
-                of = [row for row in ends if row["verdict"] == verdict]
-                values = sorted(float(row["judge_fine_lowest_view"]) for row in of)
-                confidences = sorted(float(row["confidence"] or "nan") for row in of)
-                print(f"{bone}, {'right' if is_right else 'wrong'}: {len(of)} {verdict}"
+                same = [row for row in ends if row["verdict"] == verdict]
+                values = sorted(float(row["judge_fine_lowest_view"]) for row in same)
+                confidences = sorted(float(row["confidence"] or "nan") for row in same)
+                print(f"{bone}, {'right' if is_right else 'wrong'}: {len(same)} {verdict}"
                       + (f", lowest view in detail {values[0]:.2f} to {values[-1]:.2f}, "
-                         f"confidence {confidences[0]:.3f} to {confidences[-1]:.3f}" if of else ""))
+                         f"confidence {confidences[0]:.3f} to {confidences[-1]:.3f}" if same else ""))
 
 
 def distance_of(pose, other, center):
-    """Of the bone's centre (mm), and the angle between the two (deg)."""
+    """The distance of the bone's centre (mm) and the angle (deg) between two poses."""
     turn = pose[:3, :3].T @ other[:3, :3]
     mm = np.linalg.norm((pose[:3, :3] - other[:3, :3]) @ center + pose[:3, 3] - other[:3, 3])
     return mm, np.degrees(np.arccos(np.clip((np.trace(turn) - 1) / 2, -1, 1)))

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// af-evaluate as a user meets it: files, the same rows on every rank count, exit codes, messages.
+// What a user meets in af-evaluate: files, the same rows on every rank count, exit codes, messages.
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -43,8 +43,8 @@ class EvaluateProgram : public test::EvaluatedStudy {
   static void SetUpTestSuite() {
     set_up([] { write_study_with_fiducials(path("")); });
   }
-  /// Once a process: a run of every kind, and a registration whose searches end too early to
-  /// succeed, with a report of all.
+  /// Makes, once per process, a run of every kind, a registration whose searches end too early to
+  /// succeed, and a report of all.
   static void make_runs_of_every_kind() {
     if (std::filesystem::exists(path("runs/report.html"))) return;
     const std::string registration =
@@ -133,9 +133,9 @@ TEST_F(EvaluateProgram, RegistersAlikeOnAnyRankCount) {
   ASSERT_EQ(rows.row_count(), 12u + 4u);
   for (std::size_t i = 0; i < rows.row_count(); ++i) {
     EXPECT_EQ(rows.text(i, "renderer"), i < 12 ? "field" : "raycast");
-    // The gold pose is the fiducials', and these are exact: both errors are the same.
+    // The gold pose comes from the fiducials, which are exact, so both errors are the same.
     EXPECT_NEAR(rows.number(i, "tre_mm"), rows.number(i, "stated_pose_tre_mm"), 1e-6);
-    // The X-rays are ray-cast DRRs: whatever starts within 2 mm must succeed.
+    // The X-rays are ray-cast DRRs, so every start within 2 mm must succeed.
     if (rows.number(i, "initial_tre_mm") < 2.0) {
       EXPECT_EQ(rows.text(i, "success"), "1");
     }
@@ -219,7 +219,7 @@ TEST_F(EvaluateProgram, MeasuresPosesOfAnotherProgramLikeItsOwn) {
                 .exit_code,
             0);
   const CsvTable own = CsvTable::read(path("own/registrations.csv"));
-  // As a table of its own parameters: the same errors, without X-rays or fields.
+  // The run's own table as found poses must give the same errors, without X-rays or fields.
   const test::ProgramRun again =
       evaluate(study + "--starts-from " + path("own/starts.csv") + " --poses-from " +
                    path("own/registrations.csv") + " --method-name again -o " + path("again"),
@@ -227,14 +227,15 @@ TEST_F(EvaluateProgram, MeasuresPosesOfAnotherProgramLikeItsOwn) {
   ASSERT_EQ(again.exit_code, 0) << again.output;
   const CsvTable rows = CsvTable::read(path("again/registrations.csv"));
   ASSERT_EQ(rows.row_count(), own.row_count());
-  // Angles in degrees and back: 1e-16 of 1 rad times 100 mm.
+  // Angles go to degrees and back: 1e-16 of 1 rad times 100 mm.
   constexpr double kRoundingMm = 1e-9;
   for (std::size_t i = 0; i < own.row_count(); ++i)
     for (const char* name : {"tre_mm", "initial_tre_mm", "mrpd_mm", "rotation_error_deg"})
       EXPECT_NEAR(rows.number(i, name), own.number(i, name), kRoundingMm) << name;
   EXPECT_TRUE(json::parse(text("again/summary.json"))["row_problems"].empty());
 
-  // As ITK transforms, one missing and one of a start that does not exist.
+  // The same poses as ITK transforms. One is missing, and one belongs to a start that does not
+  // exist.
   std::filesystem::create_directories(path("tfm"));
   const CsvTable starts = CsvTable::read(path("own/starts.csv"));
   for (std::size_t i = 1; i < starts.row_count() + 1; ++i) {
@@ -279,7 +280,7 @@ TEST_F(EvaluateProgram, RegistersFromTheStartsOfAFile) {
   ASSERT_EQ(rows.row_count(), 4u);
   for (std::size_t i = 0; i < 4; ++i)
     EXPECT_EQ(rows.text(i, "initial_tre_mm"), starts.text(i, "initial_tre_mm"));
-  // What rank 0 alone reads and finds bad ends all.
+  // When rank 0 alone reads a bad file, all ranks end.
   expect_refused(evaluate(study + "--starts-from " + path("missing.csv") + " -o " + path("bad"), 2),
                  4,
                  "missing.csv");
@@ -337,7 +338,7 @@ TEST_F(EvaluateProgram, DrawsSimilarityAboutTheGoldPoseAlikeOnAnyRankCount) {
 
 TEST_F(EvaluateProgram, MeasuresErrorsAgainstFractionsOfACell) {
   const std::string arguments = "lattice-errors --study " + path("study.toml") + fields();
-  // The last stage sees the X-rays' own pixels, so that its optimum by ray casting is the truth.
+  // The last stage sees the X-rays' own pixels, so its optimum by ray casting is the truth.
   const test::ProgramRun run = evaluate(
       arguments + "--chain 'ncc gauss-newton level=1 pixels=2; gc gauss-newton final=0.005'" +
           " --fractions 2 --renderer both -o " + path("cells.md"),
@@ -377,7 +378,7 @@ TEST_F(EvaluateProgram, BuildsTheFieldsOfASweepOnceAndReusesThem) {
   ASSERT_EQ(second.exit_code, 0) << second.output;
   EXPECT_EQ(std::filesystem::last_write_time(path("sweep-fields/AP-uv8-st64-n16-t0.1.af.h5")),
             made);
-  // Also the creation times: they are the fields' own.
+  // Even the creation times are the same, because they are the fields' own.
   EXPECT_EQ(text("sweep-1/field-parameters.csv"), text("sweep-2/field-parameters.csv"));
   const CsvTable table = CsvTable::read(path("sweep-1/field-parameters.csv"));
   ASSERT_EQ(table.row_count(), 4u);  // base, uv 4, st 64, 64 codewords
@@ -385,7 +386,7 @@ TEST_F(EvaluateProgram, BuildsTheFieldsOfASweepOnceAndReusesThem) {
   EXPECT_LT(table.number(1, "psnr_median_db"), table.number(0, "psnr_median_db"));
   EXPECT_GT(table.number(2, "psnr_median_db"), table.number(0, "psnr_median_db"));
   EXPECT_TRUE(std::filesystem::exists(path("sweep-1/field-parameters.svg")));
-  // Another range under the same names: refused, not reused.
+  // Fields of another range under the same names are refused, not reused.
   std::string other = arguments;
   other.replace(other.find("--max-rotation-deg 8"), 20, "--max-rotation-deg 7");
   expect_refused(evaluate(other + path("sweep-3")), 4, "options of the field to reuse");
@@ -412,7 +413,8 @@ TEST_F(EvaluateProgram, PoolsTheFieldsOfAllViewsOfAStudy) {
       EXPECT_NEAR(pooled.number(i, column), mean, kRounding * mean);
     }
   const CsvTable differences = CsvTable::read(path("pooled/difference-images.csv"));
-  // Of two settings one may be nearest to several of the paper's three levels: no DRR twice.
+  // One of two settings may be nearest to several of the paper's three levels. No DRR appears
+  // twice.
   ASSERT_GE(differences.row_count(), 1u);
   ASSERT_LE(differences.row_count(), 2u);
   for (std::size_t i = 1; i < differences.row_count(); ++i) {
@@ -442,7 +444,7 @@ TEST_F(EvaluateProgram, ComparesTheFieldsOfAStudyTogetherAndSplitsTheirLoss) {
   EXPECT_EQ(rows.text(5, "camera"), "LAT");
   const CsvTable parts = CsvTable::read(path("together-1" + split));
   ASSERT_EQ(parts.row_count(), 2u);
-  // The whole loss is the one that the table has.
+  // The total must be the loss that the other table states.
   constexpr double kRoundingDb = 1e-6;
   for (std::size_t i = 0; i < 2; ++i)
     EXPECT_NEAR(parts.number(i, "total_psnr_db"), rows.number(3 + i, "psnr_db"), kRoundingDb);
@@ -522,7 +524,7 @@ TEST_F(EvaluateProgram, DrawsNoPicturesWhereNoneAreWanted) {
   EXPECT_FALSE(std::filesystem::exists(path("plain/run/slicer")));
   for (const auto& entry : std::filesystem::directory_iterator(path("plain/run")))
     EXPECT_FALSE(entry.path().filename().string().starts_with("ellipsoids-")) << entry.path();
-  // All else is the same, and a report leaves out what is not there.
+  // All else is the same, and a report leaves out what is missing.
   EXPECT_EQ(CsvTable::read(path("plain/run/registrations.csv")).row_count(), 2u);
   ASSERT_EQ(evaluate("report " + path("plain/run") + " -o " + path("plain/report.html")).exit_code,
             0);
@@ -561,7 +563,7 @@ TEST_F(EvaluateProgram, RepeatsAFailedStartByTheCommandInTheReport) {
   const std::size_t at = page.find(opening);
   ASSERT_NE(at, std::string::npos) << "the short searches all succeeded";
   const std::size_t first = at + opening.size();
-  // The scratch folder's name needs no quotes: nothing of the command is an HTML entity but &&.
+  // The scratch folder's name needs no quotes, so && gives the only HTML entities of the command.
   std::string command = page.substr(first, page.find("</pre>", first) - first);
   for (std::size_t i = command.find("&amp;"); i != std::string::npos; i = command.find("&amp;"))
     command.replace(i, 5, "&");
@@ -590,7 +592,7 @@ TEST_F(EvaluateProgram, RepeatsAFailedStartByTheCommandInTheReport) {
 }
 
 TEST_F(EvaluateProgram, ComputesWithoutPythonAndNamesTheCommandForFigures) {
-  // A copy of the program, beside which there is no af-report, and no PATH in which to find one.
+  // A copy of the program finds no af-report: none is beside it, and PATH leads nowhere.
   std::filesystem::create_directories(path("alone"));
   std::filesystem::copy_file(AF_PROGRAM_FOLDER "/af-evaluate", path("alone/af-evaluate"));
   const std::string command = "PATH=" + path("nowhere") + " " + path("alone/af-evaluate") + " ";

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Result sets whose errors are set by hand, through the real program: the statistics are the known
-// ones, to the last bit where they are counts, and nothing that is wrong with the set is absorbed.
+// Runs the real program on result sets whose errors are set by hand. It must give the known
+// statistics (to the last bit where they are counts), and report everything that is wrong with a
+// set.
 #include <cmath>
 #include <filesystem>
 #include <limits>
@@ -27,8 +28,8 @@ using testing::HasSubstr;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-/// The gold pose of every case: a quarter turn and a move by whole millimetres, so that a pose
-/// beside it by a fraction of a power of two has exactly that TRE.
+/// The gold pose of every case: a quarter turn and a shift by whole millimetres. A pose that is
+/// shifted from it by a multiple of a power of two then has exactly that TRE.
 RigidTransform gold_pose() {
   RigidTransform pose = RigidTransform::Identity();
   pose.linear() << 0, -1, 0, 1, 0, 0, 0, 0, 1;
@@ -49,7 +50,8 @@ std::string pose_text(double tre_mm) {
 
 constexpr const char* kPoseColumns = ",m00,m01,m02,m03,m10,m11,m12,m13,m20,m21,m22,m23\n";
 
-/// One case by hand: its starts' initial TREs, and their final ones; nullopt: no row at all.
+/// One case by hand: initial and final TREs of its starts. A final nullopt means that the row is
+/// missing.
 struct HandBuiltCase {
   std::string name;
   std::vector<double> initial_tre_mm;
@@ -99,7 +101,7 @@ class HandBuiltResults : public testing::Test {
     return (folder_ / name).string();
   }
 
-  /// The program's run on poses.csv.
+  /// Runs the program on poses.csv.
   test::ProgramRun evaluate(const std::string& more = "") {
     write_text_file(path("poses.csv"), poses_);
     std::filesystem::remove_all(path("out"));
@@ -147,12 +149,12 @@ TEST_F(HandBuiltResults, HaveExactlyTheKnownStatistics) {
   EXPECT_EQ(all["starts"], 61);
   EXPECT_EQ(all["successes"], 12 + 20 + 0 + 1);
   EXPECT_EQ(all["rate"], 33.0 / 61.0);
-  // Wilson's formula, worked out apart.
+  // By Wilson's formula, worked out separately.
   EXPECT_NEAR(all["wilson_low"].get<double>(), 0.41724048130756475, 1e-12);
   EXPECT_NEAR(all["wilson_high"].get<double>(), 0.6598706770614424, 1e-12);
   EXPECT_EQ(all["without_pose"], 2 + 20);
   EXPECT_EQ(all["failures_by_reason"], json({{"no pose given", 22}, {"other optimum", 6}}));
-  // By interval of 2 mm, of 3 cases of 20 starts and one of 3 mm.
+  // Starts by interval of 2 mm: of three cases with 20 starts, and of one with a start at 3 mm.
   const std::vector<int> starts = {9, 7, 9, 9, 6, 9, 9, 3};
   const std::vector<int> successes = {6, 5, 6, 6, 3, 3, 3, 1};
   for (std::size_t i = 0; i < starts.size(); ++i) {
@@ -180,11 +182,12 @@ TEST_F(HandBuiltResults, OfAMixedCaseAreKnownToTheLastBit) {
   EXPECT_EQ(mixed["cumulative_capture_range"]["initial_tre_mm"], 0.25 + 0.75 * 11);
   EXPECT_EQ(mixed["cumulative_capture_range"]["starts"], 12);
   EXPECT_EQ(mixed["cumulative_capture_range"]["is_whole_study"], false);
-  // 0.25 + 0.75 i mm: start 12, the first to fail, lies at 9.25 mm, in the interval from 8 mm.
+  // Starts lie at 0.25 + 0.75 i mm. Start 12, the first to fail, lies at 9.25 mm, in the interval
+  // from 8 mm.
   EXPECT_EQ(mixed["capture_range"]["initial_tre_mm"], 8.0);
   EXPECT_EQ(mixed["capture_range"]["starts"], 11);
   EXPECT_EQ(mixed["capture_range"]["end_interval"]["low_mm"], 8.0);
-  // A pure shift: no rotation, the whole of it translation.
+  // A pure shift has no rotation error, and its translation error is the whole TRE.
   const CsvTable rows = CsvTable::read(path("out/registrations.csv"));
   EXPECT_EQ(rows.text(20, "case"), "mixed");
   EXPECT_EQ(rows.number(20, "tre_mm"), 0.25);
@@ -219,7 +222,7 @@ TEST_F(HandBuiltResults, SayHowTheStartsWereDrawnAsFarAsTheyKnow) {
   ASSERT_EQ(evaluate().exit_code, 0);
   const CsvTable starts = CsvTable::read(path("out/starts-per-interval.csv"));
   ASSERT_EQ(starts.row_count(), 4u * 8u);
-  // The starts are given ones: nobody knows which draws were refused. They are pure shifts.
+  // The starts were given, so the number of refused draws is unknown. They are pure shifts.
   EXPECT_EQ(starts.text(0, "draws"), "nan");
   EXPECT_EQ(starts.text(0, "refused_draws"), "nan");
   EXPECT_NEAR(starts.number(0, "rotation_share_of_starts"), 0.0, 1e-9);
@@ -246,8 +249,8 @@ TEST_F(HandBuiltResults, OfFewCasesComeWithAWarning) {
   const json over = statistics()["over_cases"]["rate"];
   EXPECT_EQ(over["cases"], 4);
   EXPECT_EQ(over["is_optimistic"], true);
-  // Rates 0.6, 1, 0, 1: mean 0.65, SD 0.4725816; Student's 3.182446 at three degrees of freedom
-  // reaches beyond both ends.
+  // The rates 0.6, 1, 0 and 1 have the mean 0.65 and the SD 0.4725816. Student's 3.182446 at three
+  // degrees of freedom reaches beyond both ends.
   EXPECT_EQ(over["student_low"], 0.0);
   EXPECT_EQ(over["student_high"], 1.0);
   EXPECT_EQ(summary()["warnings"].size(), 1u);
@@ -300,7 +303,7 @@ TEST_F(HandBuiltResults, AreRefusedWhenTheStartsThemselvesAreAmbiguous) {
   const std::string starts = read_text_file(path("starts.csv"));
   const auto line_of_start_1 = starts.find("mixed,1,");
   const auto line_of_start_2 = starts.find("mixed,2,");
-  // Without start 1 every later start would answer to another number.
+  // Without start 1, every later start would have another number.
   write_text_file(path("starts.csv"),
                   starts.substr(0, line_of_start_1) + starts.substr(line_of_start_2));
   const test::ProgramRun run = evaluate();
@@ -318,7 +321,7 @@ TEST_F(HandBuiltResults, InAChainGiveTheKnownErrorBudget) {
   };
   ASSERT_EQ(evaluate("--case perfect").exit_code, 0);
   std::filesystem::rename(path("out"), path("first"));
-  // Every end of the case 0.25 mm farther along the same axis.
+  // Moves every end of the case 0.25 mm farther along the same axis.
   const std::string before = pose_text(0.5);
   const std::string after = pose_text(0.75);
   for (auto at = poses_.find(before); at != std::string::npos;
@@ -330,10 +333,10 @@ TEST_F(HandBuiltResults, InAChainGiveTheKnownErrorBudget) {
   EXPECT_THAT(run.output,
               HasSubstr("| moved | 20 of 20 | 0.250 +- 0.000 | 0.750 | 0.000 | 0.750 |"));
   const json steps = json::parse(read_text_file(path("budget/summary.json")))["steps"];
-  // Final parameters are written in degrees and read back: rounding of poses of 1 mm.
+  // Final parameters are written in degrees and read back, which rounds poses of 1 mm.
   EXPECT_NEAR(steps[1]["shift_mm"].get<double>(), 0.25, 1e-12);
   EXPECT_NEAR(steps[0]["bias_mm"].get<double>(), 0.5, 1e-12);
-  // In the report, too.
+  // The report has it, too.
   ASSERT_EQ(test::run_command(std::string(AF_PROGRAM_FOLDER "/af-evaluate report ") +
                               path("budget") + " -o " + path("budget.html"))
                 .exit_code,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// af-evaluate cut short: it goes on to the same rows, on any rank count.
+// When af-evaluate is cut short, it goes on to the same rows, on any rank count.
 #include <chrono>
 #include <csignal>
 #include <filesystem>
@@ -67,8 +67,9 @@ std::uint64_t record_bytes(const std::filesystem::path& progress) {
   return bytes;
 }
 
-/// Waits until some registrations are kept, holds the ranks there, so that they cannot be faster
-/// than the cut, and cuts the run short. Its exit code, once nothing of it is left.
+/// Waits until some registrations are kept, and cuts the run short. It holds the ranks first, so
+/// that they cannot finish before the cut. Returns the exit code once no process of the run is
+/// left.
 int exit_code_when_cut(const Cut& cut,
                        const std::vector<std::string>& command,
                        const std::string& progress,
@@ -142,7 +143,7 @@ TEST_F(EvaluateStops, AStoppedRankIsNamedWithItsStartAndTheJobEnded) {
   ASSERT_FALSE(job.ranks().empty());
   kill(job.ranks().back(), SIGSTOP);
   EXPECT_EQ(job.wait(kEndsWithin), 75) << text("said.txt");
-  // Wherever it was: at a start, or waiting for the other.
+  // The stopped rank was at a start, or waited for the other.
   EXPECT_THAT(text("said.txt"),
               testing::ContainsRegex(
                   "rank [01] on .*(registrations: item [0-9]+ .[0-9]+ of 80.: no progress for|"
@@ -169,7 +170,7 @@ TEST_F(EvaluateStops, EveryStageThatTakesLongGoesOnAfterStops) {
   struct Run {
     std::string arguments;
     std::string name;
-    std::vector<std::string> tables;  // of a stage each
+    std::vector<std::string> tables;  // one per stage
   };
   for (const auto& [arguments, name, tables] :
        {Run{field, "field-", {"image-quality.csv", "loss-split.csv"}},

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What goes wrong on clusters, made to happen: each ends the job with one message that names rank,
-// host, unit and cause, and the same command goes on afterwards.
+// Makes happen what goes wrong on clusters. Each fault ends the job with one message that names
+// rank, host, unit and cause, and the same command goes on afterwards.
 #include <algorithm>
 #include <csignal>
 #include <cstdlib>
@@ -89,8 +89,8 @@ class Faults : public testing::Test {
     EXPECT_FALSE(fs::exists(field().string() + ".lock"));
   }
 
-  /// `command` on a disk that is full: no file of a rank may grow beyond `bytes`. Segments of
-  /// shared memory are such files, so that messages take the loopback.
+  /// `command` as on a full disk: no file of a rank may grow beyond `bytes`. Segments of shared
+  /// memory are files, too, so messages go through the loopback.
   static std::vector<std::string> on_full_disk(std::vector<std::string> command,
                                                std::uint64_t bytes) {
     const auto insert_at = [&](const std::string& word, int after, std::vector<std::string> words) {
@@ -121,7 +121,7 @@ TEST_F(Faults, IsPrepared) {
 }
 
 TEST_F(Faults, TimeThatIsOverStopsTheJobByItself) {
-  // 1.1 s after the start of each rank: casting alone takes longer.
+  // The limit passes 1.1 s after the start of each rank. Casting alone takes longer.
   const test::ProgramRun run =
       test::run_command(words(precompute(kRanks, {"--max-hours", "1e-4"})));
   EXPECT_EQ(run.exit_code, 75) << run.output;
@@ -132,7 +132,7 @@ TEST_F(Faults, TimeThatIsOverStopsTheJobByItself) {
 TEST_F(Faults, ASecondJobIsRefusedAndToldOfTheFirst) {
   test::LaunchedJob first(precompute(2), output());
   ASSERT_TRUE(first.wait_until([] { return unit_bytes() > 0; }));
-  // Or it may have ended before the second looks.
+  // Holds the first job, which might otherwise end before the second looks.
   for (const pid_t rank : first.ranks()) kill(rank, SIGSTOP);
   const test::ProgramRun second = test::run_command(words(precompute(1)));
   for (const pid_t rank : first.ranks()) kill(rank, SIGCONT);
@@ -144,7 +144,8 @@ TEST_F(Faults, ASecondJobIsRefusedAndToldOfTheFirst) {
 }
 
 TEST_F(Faults, AStoppedRankIsNamedAndTheJobEnded) {
-  // On a busy machine a collective write may well take some seconds.
+  // The limit must be longer than a collective write, which may take some seconds on a busy
+  // machine.
   test::LaunchedJob job(precompute(kRanks, {"--stall-minutes", "0.15"}), output());
   ASSERT_TRUE(job.wait_until([] { return unit_bytes() > 0; })) << said();
   ASSERT_FALSE(job.ranks().empty());
@@ -156,7 +157,7 @@ TEST_F(Faults, AStoppedRankIsNamedAndTheJobEnded) {
 }
 
 TEST_F(Faults, ARankThatIsStoppedWhileOthersEndDoesNotKeepTheJob) {
-  // Rank 1 stops itself while rank 0, which has nothing more to do, waits for it in MPI's end.
+  // Rank 1 stops itself. Rank 0 has nothing more to do, and waits for it in MPI_Finalize().
   test::LaunchedJob job({AF_MPIEXEC,
                          "--oversubscribe",
                          "-n",
@@ -179,14 +180,14 @@ TEST_F(Faults, AFullDiskWhileCastingNamesTheUnit) {
 }
 
 TEST_F(Faults, AFullDiskWhileTheFieldIsWrittenEndsTheJobAtOnce) {
-  // Ranks within a collective write of which one fails would wait for ever.
+  // When one rank fails in a collective write, the others would wait for ever.
   for (const int ranks : {1, kRanks}) {
     constexpr std::uint64_t kMoreThanTheDeflatedCodebook = 400'000;
     test::LaunchedJob job(
         on_full_disk(precompute(ranks, {"--no-checkpoint"}), kMoreThanTheDeflatedCodebook),
         output());
     EXPECT_EQ(job.wait(kEndsWithin), 4) << said();
-    // Where Open MPI's write says nothing of the failure, closing the file does.
+    // Where Open MPI's write does not report the failure, closing the file does.
     const std::string rank = ranks == 1 ? "af-precompute: " : "rank [0-9] on .*: ";
     EXPECT_THAT(said(),
                 ContainsRegex(rank + "(writing round 1 of the indices: .*H5Dwrite"
@@ -205,7 +206,7 @@ TEST_F(Faults, AProgressFolderDeletedMeanwhileIsSaidOrNotNeeded) {
   std::error_code error;
   do fs::remove_all(progress(), error);
   while (fs::exists(progress()));
-  // Shards are open, so casting goes on; the training's journal cannot be made again.
+  // Casting goes on, because its shards are open. The journal of the training cannot be created.
   EXPECT_EQ(job.wait(kEndsWithin), 4) << said();
   EXPECT_THAT(said(), HasSubstr(progress().string()));
   expect_going_on();

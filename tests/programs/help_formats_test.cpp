@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the programs print of their options for other readers than people: 3D Slicer, man, shells.
+// How the programs describe their options to other programs: 3D Slicer, man, shells.
 #include <fstream>
 #include <sstream>
 #include <string>
@@ -45,7 +45,8 @@ TEST(SlicerModule, IsOneOfSlicersExecutionModel) {
 TEST(SlicerModule, NamesOptionsThatTheProgramReads) {
   for (const char* name : {"af-drr", "af-register"}) {
     const test::ProgramRun run = as_slicer(name, "--every-option");
-    // All at once contradict each other, which is an error of input; 2 would be one of usage.
+    // All options at once contradict each other, which is an error of input. 2 would be one of
+    // usage.
     EXPECT_EQ(run.exit_code, 3) << name << ": " << run.output;
   }
 }
@@ -116,7 +117,7 @@ TEST(ManPage, OfEveryProgramIsCleanRoff) {
   EXPECT_THAT(page.output, AllOf(HasSubstr("--rotation-deg"), HasSubstr("EXIT STATUS")));
 }
 
-/// What bash offers after `line`, whose last word is begun.
+/// What bash offers to complete the last word of `line`.
 std::string bash_offers(const std::string& name, const std::string& line) {
   const ScratchFolder folder;
   std::ofstream(folder / "ask.sh") << "source <(" << program(name) << " --help-as bash)\n"
@@ -130,7 +131,7 @@ std::string bash_offers(const std::string& name, const std::string& line) {
 TEST(BashCompletion, OffersOptionsAndTheNamesTheyChooseFrom) {
   EXPECT_EQ(bash_offers("af-drr", "--rot"), "--rotation-deg\n");
   EXPECT_EQ(bash_offers("af-register", "--renderer f"), "field\n");
-  // A file: bash's own completion takes over.
+  // A file is wanted, so bash's own completion takes over.
   EXPECT_EQ(bash_offers("af-register", "--study s"), "\n");
   EXPECT_EQ(bash_offers("af-evaluate", "image-q"), "image-quality\n");
   EXPECT_THAT(bash_offers("af-evaluate", "image-quality --pose-c"), HasSubstr("--pose-count"));

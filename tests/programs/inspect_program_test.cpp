@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// af-inspect as a user meets it: what it recognises, what it says, how it ends.
+// What a user meets in af-inspect: what it recognises, what it says, how it ends.
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -97,8 +97,8 @@ TEST(AfInspect, TellsACtsGeometryValuesAndContentHash) {
   EXPECT_EQ(facts["geometry"]["axes_point_to"], json({"R", "A", "S"}));
   EXPECT_EQ(facts["ct_content_sha256"], identity_of(ct).content_sha256);
   EXPECT_EQ(facts["values"]["min_hu"], -1000);
-  // 7 x 6 x 5 voxels, of which all with i < 2 or j < 1 are air: 1 - (5 * 5) / (7 * 6). Where
-  // position adds up to 100 HU (i + 7 j + 13 k = 100 at most 93), air stays below -900.
+  // Of 7 x 6 x 5 voxels, those with i < 2 or j < 1 are air: 1 - (5 * 5) / (7 * 6). The position
+  // adds at most 93 HU (i + 7 j + 13 k), so air stays below -900.
   EXPECT_DOUBLE_EQ(facts["values"]["share_air_below_-900_hu"].get<double>(), 1.0 - 25.0 / 42.0);
   // From -0.5 to 6.5 voxels of 0.8 mm towards R from -31.25 mm.
   EXPECT_NEAR(facts["geometry"]["right_to_left_mm"][0].get<double>(), -31.25 - 6.5 * 0.8, 1e-4);
@@ -146,7 +146,7 @@ TEST(AfInspect, RefusesADicomFolderWithTwoSeriesUntilOneIsChosen) {
 TEST(AfInspect, KnowsUnfinishedWork) {
   const ScratchFolder folder;
   std::filesystem::create_directories(folder / "f.h5.progress");
-  // Options may be long, and stand before the format.
+  // The recorded options may be long, and may come before the format.
   std::ofstream(folder / "f.h5.progress" / "units.json")
       << R"({"decides": {"seed": ")" << std::string(10000, '1')
       << R"("}, "format": "af-progress-journal", "format_version": 4, "plan": 1})";
@@ -238,7 +238,7 @@ TEST(AfInspect, RecognisesPosesTablesAndResults) {
   const json summary = inspect_json((folder / "summary.json").string());
   EXPECT_EQ(summary["kind"], "attenuation-fields evaluation");
   EXPECT_EQ(summary["facts"]["provenance"]["seed"], 7);
-  // The folder that holds them all.
+  // The folder that holds all of these.
   const json all = inspect_json(folder.path().string());
   EXPECT_EQ(all["kind"], "folder of results");
   EXPECT_EQ(all["items"].size(), 5u);
@@ -327,7 +327,7 @@ int png_width(const fs::path& path) {
   return width;
 }
 
-// Marks so rough that the pose sought from the nominal one is this one only to rounding.
+// The marks are so rough that the pose found from the nominal one differs from it only by rounding.
 TEST(AfInspect, DrawsOneDrrWhereRoughLandmarksGiveTheNominalPose) {
   const ScratchFolder folder;
   test::write_small_study(folder.path());
@@ -353,7 +353,7 @@ TEST(AfInspect, DrawsOneDrrWhereRoughLandmarksGiveTheNominalPose) {
   EXPECT_EQ(png_width(picture), width);
 }
 
-// The target and the CT's air are in the beam, its anatomy is 400 mm beside it.
+// The target and the CT's air are in the beam; the anatomy is 400 mm beside it.
 TEST(AfInspect, RefusesAnEmptyDrrByNameAndDrawsIt) {
   const ScratchFolder folder;
   test::write_small_study(folder.path());
@@ -463,7 +463,7 @@ TEST(AfInspect, VerifiesAFieldAndAStudyAndSeesDamage) {
                              " --uv-nodes 6 --st-nodes 24 --codewords 16 " +
                              more + " -o " + (folder / "both.af.h5").string());
   };
-  // Ranges per axis, and about poses: the bounds stand in the file.
+  // For ranges per axis, and ranges about poses, the file holds the bounds.
   const fs::path bounded = folder / "bounded.af.h5";
   std::ofstream(folder / "poses.csv") << "rx_deg,ry_deg,rz_deg,tx_mm,ty_mm,tz_mm\n"
                                          "0,0,0,0,0,0\n1,0,-3,0,5,0\n";
@@ -478,7 +478,8 @@ TEST(AfInspect, VerifiesAFieldAndAStudyAndSeesDamage) {
             "rx -2 to 3 ry -2 to 2 rz -8 to 1 degrees, tx -4 to 4 ty -4 to 9 tz -4 to 4 mm");
   EXPECT_FALSE(facts.contains("range"));
 
-  // The rays of a further camera, which the field alone would not hold over the same range.
+  // The field is to hold the rays of a second camera, too, which it would not otherwise hold over
+  // this range.
   CameraRig rig = read_rig((folder / "rig.toml").string());
   for (CameraGeometry& camera : rig.cameras) camera.source_point.x() += 20.0;
   std::ofstream(folder / "moved.toml") << rig_to_toml(rig);
@@ -497,7 +498,8 @@ TEST(AfInspect, VerifiesAFieldAndAStudyAndSeesDamage) {
                             both.identity.frame,
                             both.identity.range));
 
-  // Named by the study, it is said what it covers: its own range, for its own camera and region.
+  // When the study names the field, af-inspect says what the field covers: its own range, for its
+  // own camera and region.
   std::ifstream lines(study);
   std::string text((std::istreambuf_iterator<char>(lines)), {});
   const std::size_t at = text.find("xray = ");
@@ -511,7 +513,7 @@ TEST(AfInspect, VerifiesAFieldAndAStudyAndSeesDamage) {
 
   fs::resize_file(field, fs::file_size(field) / 2);
   EXPECT_EQ(inspect(field.string()).exit_code, 4);
-  // A study is sound though a field of it is not; it is said.
+  // A study is sound even when its field is not, but af-inspect reports the field.
   const test::ProgramRun halved = inspect(study);
   EXPECT_EQ(halved.exit_code, 0) << halved.output;
   EXPECT_THAT(halved.output, HasSubstr("cannot be used"));

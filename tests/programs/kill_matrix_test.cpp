@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Jobs cut short at random moments within every stage, and gone on with on other rank counts:
-// nothing lost, nothing done twice, the same bytes. What befalls the files in between is mended or
-// refused. A seeded handful; AF_KILLS=100 kills as many times, AF_KILL_SEED draws others.
+// Cuts jobs short at random moments within every stage, and continues them on other rank counts.
+// Nothing may be lost or done twice, and the bytes are the same. Files damaged in between are
+// mended or refused. By default a few kills are drawn: AF_KILLS=100 kills as many times,
+// AF_KILL_SEED draws others.
 #include <algorithm>
 #include <array>
 #include <csignal>
@@ -85,7 +86,7 @@ std::uint64_t bytes_of_journals(const fs::path& folder, bool are_of_units) {
   return bytes;
 }
 
-/// Units first: as long as there is no training after them, they are cast ones.
+/// Units are read first. If training is still empty after them, they are cast ones.
 ProgressBytes progress_bytes(const fs::path& folder) {
   ProgressBytes bytes;
   bytes.units = bytes_of_journals(folder, true);
@@ -100,7 +101,7 @@ struct KeptWork {
   std::uint64_t iterations = 0;
 };
 
-/// A unit has two keys: 2 n of its tiles, 2 n + 1 of its indices.
+/// Unit n has two keys: 2 n for its tiles, 2 n + 1 for its indices.
 KeptWork kept_work(const fs::path& folder) {
   KeptWork kept;
   for (const std::int64_t key : test::kept_keys(folder, "units."))
@@ -109,7 +110,7 @@ KeptWork kept_work(const fs::path& folder) {
   return kept;
 }
 
-/// Progress at which a stage begins and ends, from an undisturbed run.
+/// Bytes of progress at which the stages of an undisturbed run end.
 struct StageBytes {
   std::uint64_t all_cast = 0;
   std::uint64_t all_trained = 0;
@@ -169,7 +170,7 @@ class KillMatrix : public testing::Test {
     return json::parse(run.output)[0]["facts"];
   }
 
-  /// Of each rank count: the payload, and where the stages lie. Of registrations: the rows.
+  /// Measures where the stages lie for each rank count, the payload, and the rows of registrations.
   static void run_undisturbed() {
     test::write_small_study(folder_->path());
     make_fields();
@@ -186,7 +187,7 @@ class KillMatrix : public testing::Test {
     job.wait_until([&] {
       const ProgressBytes now = progress_bytes(progress);
       bytes.all_trained = std::max(bytes.all_trained, now.training);
-      // Not while the folder is being removed.
+      // Asks for the maximum, because training is 0 again while the folder is being removed.
       if (bytes.all_trained == 0) bytes.all_cast = std::max(bytes.all_cast, now.units);
       bytes.all_encoded = std::max(bytes.all_encoded, now.units);
       return false;
@@ -207,8 +208,8 @@ class KillMatrix : public testing::Test {
 
   double fraction() { return std::uniform_real_distribution<>(0.0, 1.0)(random_); }
 
-  /// Waits for a moment of a stage, drawn uniformly over its finished work, and a little longer:
-  /// moments within a unit are hit, too.
+  /// Waits for a moment of a stage that is drawn uniformly over its finished work, and then a
+  /// little longer, so that moments within a unit are hit, too.
   bool reach(const Plan& plan, test::LaunchedJob& job, const fs::path& progress) {
     const StageBytes stages = bytes_on(plan.ranks);
     const std::uint64_t registration_bytes = undisturbed_["registration_bytes"];
@@ -242,8 +243,8 @@ class KillMatrix : public testing::Test {
     std::shuffle(ranks.begin(), ranks.end(), random_);
     if (plan.cut == Cut::Usr1) kill(job.launcher(), SIGUSR1);
     if (plan.cut == Cut::Term) {
-      // Open MPI wakes the ranks a second before it passes the signal on, which is longer than
-      // some stages last here: the ranks are kept where they are.
+      // Open MPI wakes the ranks a second before it passes the signal on. Some stages are shorter
+      // than that, so this keeps stopping the ranks.
       kill(job.launcher(), SIGTERM);
       job.wait_until([&] {
         for (const pid_t rank : job.ranks()) kill(rank, SIGSTOP);
@@ -273,7 +274,7 @@ class KillMatrix : public testing::Test {
     return true;
   }
 
-  /// Goes on to the end: the same payload, and none of the kept work done again.
+  /// Continues to the end. The payload must be the same, and no kept work may be done again.
   void expect_whole(const Plan& plan, const fs::path& field) {
     const fs::path progress = field.string() + ".progress";
     const KeptWork kept = kept_work(progress);
@@ -291,7 +292,8 @@ class KillMatrix : public testing::Test {
     encoded_kept_ += kept.encoded.size();
   }
 
-  /// Runs a command to its end: whether it did the work, or refused and said what to do.
+  /// Runs a command to its end. True when it did the work, false when it refused and said what to
+  /// do.
   static bool is_done(const std::vector<std::string>& command) {
     test::LaunchedJob job(command, path("output.txt"));
     const int exit_code = job.wait(kEndsWithin);
@@ -302,7 +304,8 @@ class KillMatrix : public testing::Test {
     return false;
   }
 
-  /// Goes on with damaged progress: the same bytes, at the latest when told to start over.
+  /// Continues with damaged progress. It must end with the same bytes, or be refused and do so with
+  /// --restart.
   void expect_same_or_refused(const Plan& plan, const fs::path& output) {
     const bool is_evaluation = plan.stage == Stage::Evaluate;
     std::vector<std::string> command = is_evaluation ? registration(plan.other_ranks, output)
@@ -341,7 +344,7 @@ class KillMatrix : public testing::Test {
     return result;
   }
 
-  /// Bytes of all rows, of which a run leaves whole/.
+  /// The bytes of all rows of an undisturbed run, which leaves its results in whole/.
   static std::uint64_t measure_registration() {
     std::uint64_t bytes = 0;
     test::LaunchedJob job(registration(2, path("whole")), path("output.txt"));
@@ -376,7 +379,7 @@ class KillMatrix : public testing::Test {
     EXPECT_FALSE(fs::exists(folder.string() + ".progress"));
   }
 
-  /// Cuts, sometimes cuts what goes on, too, and goes on to the end.
+  /// Cuts a run, sometimes cuts its continuation, too, and goes on to the end.
   void go_through(const Plan& plan) {
     SCOPED_TRACE(std::string(name_of(plan.stage)) + ", " + name_of(plan.cut) + ", " +
                  std::to_string(plan.ranks) + " ranks, then " + std::to_string(plan.other_ranks));
@@ -413,7 +416,7 @@ class KillMatrix : public testing::Test {
     return other;
   }
 
-  /// Draws of its own for each plan, so that plans can be gone through one by one.
+  /// Each plan draws from its own seed, so that a plan can be repeated alone.
   void draw_for(std::uint64_t plan) {
     constexpr std::uint64_t kMostPlans = 100'000;
     random_.seed(setting("AF_KILL_SEED", 1) * kMostPlans + plan);
@@ -440,7 +443,7 @@ TEST_F(KillMatrix, IsPrepared) {
 class KillMatrixOfCuts : public KillMatrix,
                          public testing::WithParamInterface<std::tuple<Stage, Cut>> {};
 
-/// Every stage with every cut; the rank counts take turns.
+/// Every stage meets every cut, and the rank counts take turns.
 TEST_P(KillMatrixOfCuts, GoesOnToTheSameBytesOnAnotherRankCount) {
   const auto [stage, cut] = GetParam();
   const auto turn = static_cast<std::size_t>(stage) * kCuts.size() + static_cast<std::size_t>(cut);
@@ -455,7 +458,8 @@ INSTANTIATE_TEST_SUITE_P(All,
 
 class KillMatrixOfDamages : public KillMatrix, public testing::WithParamInterface<test::Damage> {};
 
-/// Every kind of damage, or of AF_KILLS its share; stages, cuts and rank counts are drawn.
+/// Every kind of damage comes once, or has its share of AF_KILLS. Stages, cuts and rank counts are
+/// drawn.
 TEST_P(KillMatrixOfDamages, MendsOrRefusesDamagedProgress) {
   constexpr std::size_t kStages = 4;
   const std::uint64_t kills = setting("AF_KILLS", test::kDamages.size());
@@ -474,7 +478,8 @@ TEST_P(KillMatrixOfDamages, MendsOrRefusesDamagedProgress) {
 }
 INSTANTIATE_TEST_SUITE_P(All, KillMatrixOfDamages, testing::ValuesIn(test::kDamages));
 
-/// AF_KILLS times: stages, cuts and rank counts in turn, so that each of the 48 comes up.
+/// Cuts AF_KILLS times. Stages, cuts and rank counts take turns, so that each of the 48
+/// combinations comes up.
 TEST_F(KillMatrix, LosesNothingOverManyKills) {
   const std::uint64_t kills = setting("AF_KILLS", 0);
   if (kills == 0) GTEST_SKIP() << "AF_KILLS=100 asks for it";

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Programs as they are started: by themselves, by mpirun, as tasks of a step of Slurm.
+// The ways to start programs: by themselves, by mpirun, as tasks of a step of Slurm.
 #include <string>
 
 #include <gmock/gmock.h>
@@ -19,11 +19,11 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 
-/// A command that no launcher started, whatever started these tests.
+/// A command as without a launcher, whatever launched these tests.
 constexpr const char* kNoLauncher =
     "env -u OMPI_COMM_WORLD_RANK -u PMIX_RANK -u PMI_RANK -u PMI_FD -u PMI_ID"
     " -u SLURM_STEP_NUM_TASKS ";
-/// With this, MPI_Init() ends a process.
+/// With this in its environment, a process ends in MPI_Init().
 constexpr const char* kBrokenMpi = "OMPI_MCA_btl=doesnotexist ";
 constexpr const char* kMpirun = AF_MPIEXEC " -n 1 ";
 constexpr const char* kInspection = "af-inspect c-arm-12in";
@@ -92,8 +92,8 @@ TEST_F(NoLauncher, OnlyWritingAFieldStartsMpi) {
       << "MPI can start, and these tests show nothing";
 }
 
-// Open MPI would give all programs without mpirun on a machine one folder: one that ended removed
-// it while another began, which then failed.
+// On one machine, Open MPI would give all programs without mpirun the same folder. A program that
+// ended would remove it while another began, which would then fail.
 TEST_F(NoLauncher, AFieldIsWrittenWithoutAFolderOfMpisAndAWordOfIt) {
   const std::string no_folder = "TMPDIR=" + path("study.toml") + "/temporary ";
   const ProgramRun run = run_alone(no_folder + smallest_field());
@@ -122,8 +122,8 @@ TEST(Mpirun, StartsMpi) {
   EXPECT_NE(run_command(std::string(kBrokenMpi) + kMpirun + program(kInspection)).exit_code, 0);
 }
 
-/// Runs a command as one task in a step of Slurm of so many that has no process manager, as a shell
-/// by `srun --pty` where MpiDefault is none.
+/// Runs a command as one of `tasks` tasks of a Slurm step without a process manager. A shell by
+/// `srun --pty` is such a step where MpiDefault is none.
 ProgramRun in_step(int tasks, const std::string& command, int task = 0) {
   const std::string n = std::to_string(tasks);
   const std::string i = std::to_string(task);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Leaks that would make simulated registrations look better than they are, and the tests that would
-// find them (docs/threats-to-validity.md).
+// Looks for leaks that would make simulated registrations look better than they are
+// (docs/threats-to-validity.md).
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -90,7 +90,7 @@ class Leaks : public ::testing::Test {
   static inline test::ScratchFolder* folder_ = nullptr;
 };
 
-/// What is found by these X-rays is found to a third of a pixel of 2 mm at the isocentre.
+/// With these X-rays, found poses are right to a third of a pixel of 2 mm at the isocentre.
 constexpr double kFoundTreMm = 1.0;
 
 TEST_F(Leaks, TheRightXraysAreRegistered) {
@@ -100,7 +100,7 @@ TEST_F(Leaks, TheRightXraysAreRegistered) {
   EXPECT_EQ(result.at("verdict"), "found");
 }
 
-/// What a pose explains of an X-ray's gradients in detail, mean over the views.
+/// How much of the X-rays' gradients the pose explains in detail, averaged over the views.
 double detail_of(const nlohmann::json& result) {
   double sum = 0.0;
   for (const nlohmann::json& view : result.at("views").at("cameras"))
@@ -109,22 +109,22 @@ double detail_of(const nlohmann::json& result) {
 }
 
 TEST_F(Leaks, XraysOfOtherAnatomyAreNotFound) {
-  // Were there a way from CT to X-rays other than through the pose, this would register.
+  // If the CT leaked into the registration other than through the X-rays, this would register.
   copy_one("spine-for-head");
   take_xrays_of("spine", "spine-for-head");
   EXPECT_EQ(registered("spine-for-head").at("verdict"), "not found");
 }
 
 TEST_F(Leaks, XraysOfAnotherPatientFitWorse) {
-  // Heads of one model resemble each other, most of all in pixels of 2 mm at the isocentre: where
-  // they lie can be found by another's CT. But they must not fit as one's own do.
+  // Heads of one model resemble each other, most of all in pixels of 2 mm at the isocentre. Another
+  // head's CT can find their pose, but must not fit as well as their own.
   copy_one("swapped");
   take_xrays_of("other", "swapped");
   EXPECT_LT(detail_of(registered("swapped")), 0.8 * detail_of(registered("one")));
 }
 
 TEST_F(Leaks, XraysAtAnotherPoseAreFoundThereNotAtTheStudysGoldPose) {
-  // Were the gold pose of the study used, the end would be there.
+  // If the registration used the study's gold pose, it would end there.
   copy_one("moved");
   take_xrays_of("elsewhere", "moved");
   const nlohmann::json result = registered("moved");
@@ -135,7 +135,7 @@ TEST_F(Leaks, XraysAtAnotherPoseAreFoundThereNotAtTheStudysGoldPose) {
 }
 
 TEST_F(Leaks, TheGoldPoseDoesNotReachTheRegistration) {
-  // Another gold pose, and none at all: the same end to the last bit.
+  // Another gold pose, or none at all, must give the same end to the last bit.
   const nlohmann::json result = registered("one");
   const std::string study = read_text_file(path("one/study.toml"));
   const std::size_t begin = study.find("gold_room_from_ct");
@@ -153,8 +153,8 @@ TEST_F(Leaks, TheGoldPoseDoesNotReachTheRegistration) {
 }
 
 TEST_F(Leaks, AMirroredXrayIsFoundAtAnotherPoseOrNotAtAll) {
-  // A flip that both sides of a simulation share would not be noticed; one side's is. A head is
-  // nearly its own mirror image: it is found elsewhere. A hip is not.
+  // Nobody would notice a flip that both sides of a simulation share, so only one side is flipped.
+  // A head is nearly its own mirror image, and is found elsewhere. A hip is not.
   simulate("pelvis", "--anatomy-seed 1 --seed 1", 3.0, 1.0, "pelvis");
   const double own = detail_of(registered("pelvis"));
   for (const std::string study : {"one", "pelvis"}) {
@@ -176,7 +176,7 @@ TEST_F(Leaks, AMirroredXrayIsFoundAtAnotherPoseOrNotAtAll) {
 }
 
 TEST_F(Leaks, SeedsShareNoNoise) {
-  // Two X-rays of one patient at one pose whose seeds differ: their noise is independent. Of n
+  // Two X-rays of one patient at one pose with different seeds have independent noise. Over n
   // pixels the correlation is within 5 / sqrt(n).
   simulate("noise-1", "--anatomy-seed 1 --seed 1", 3.0, 0.0);
   simulate("noise-2", "--anatomy-seed 1 --seed 2", 3.0, 0.0);
@@ -200,8 +200,8 @@ TEST_F(Leaks, SeedsShareNoNoise) {
 }
 
 TEST_F(Leaks, StartsDependOnTheirSeedAndNotOnThePose) {
-  // Starts relative to gold say nothing about where gold is: a study at another true pose has the
-  // same draws, another seed has others.
+  // Starts relative to gold must not tell where gold is. A study at another true pose has the same
+  // draws, and another seed has others.
   const auto starts = [&](const std::string& study, int seed) {
     const std::string output = path("starts-" + study + std::to_string(seed));
     const test::ProgramRun run = test::run_command(
@@ -221,7 +221,7 @@ TEST_F(Leaks, StartsDependOnTheirSeedAndNotOnThePose) {
 }
 
 TEST_F(Leaks, XraysShareNoVoxelsWithTheCt) {
-  // A coarser CT of the same patient leaves the X-rays as they are: they do not come from it.
+  // X-rays do not come from the CT, so a coarser CT of the same patient leaves them as they are.
   simulate("coarse", "--anatomy-seed 1 --seed 1", 5.0);
   for (const char* const file : {"AP.mha", "LAT.mha"})
     EXPECT_EQ(read_text_file(path("one") + "/" + file),

@@ -45,7 +45,7 @@ void write_dicom_folders(const fs::path& folder) {
   });
 }
 
-/// DICOM X-rays of the valid study's detector (48 x 48), wrong in one way each.
+/// DICOM X-rays of the valid study's detector (48 x 48), each wrong in one way.
 void write_dicom_xrays(const fs::path& folder) {
   std::vector<int> levels(48 * 48, 3000);
   levels[48 * 24 + 24] = 100;
@@ -68,8 +68,8 @@ void write_dicom_xrays(const fs::path& folder) {
   });
 }
 
-/// Frames on which GDCM 3.0.21 ends its process, by signals 6 and 11 (where memory is as it was
-/// here).
+/// Frames on which GDCM 3.0.21 crashed with signals 6 and 11. Whether it does depends on what is in
+/// memory.
 void write_damaged_frames(const fs::path& folder) {
   const auto write =
       [&](const std::string& name, const test::EncodedFrame& frame, std::uint64_t key) {

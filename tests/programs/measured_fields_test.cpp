@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Fields that measured projections correct, as people make them: a simulated cone-beam scan, its
-// reconstruction, and the fields of both kinds, judged by views that nothing was fitted to.
+// Fields corrected by measured projections, made as a user would: from a simulated cone-beam scan
+// and its reconstruction. Plain and corrected fields are judged by views that nothing was fitted
+// to.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -123,7 +124,7 @@ TEST_F(MeasuredFields, PredictViewsThatWereHeldOutBetterThanTheReconstruction) {
             least.at({"elevation-3", "plain.af.h5"}) + 2.0);
 }
 
-/// Stripes that stand at the same pixels of every view are the detector's.
+/// Stripes at the same pixels of every view come from the detector.
 TEST_F(MeasuredFields, LeaveOutStripesOfTheDetectorWhenTheyAreToldTo) {
   fs::create_directory(path("study/striped"));
   for (int view = 0; view < 96; view += 2) {
@@ -150,7 +151,7 @@ TEST_F(MeasuredFields, LeaveOutStripesOfTheDetectorWhenTheyAreToldTo) {
   for (std::size_t row = 0; row < table.row_count(); ++row)
     psnr_db[table.text(row, "prediction")] = table.number(row, "psnr_db");
   EXPECT_LT(psnr_db.at("striped-kept.af.h5"), psnr_db.at("plain.af.h5"));
-  // Their codebooks differ: both fields are quantised anew, which costs them tenths of a decibel.
+  // Both fields are quantised with codebooks of their own, which costs them tenths of a decibel.
   EXPECT_NEAR(psnr_db.at("striped-removed.af.h5"), psnr_db.at("removed.af.h5"), 0.3);
   EXPECT_GT(psnr_db.at("removed.af.h5"), psnr_db.at("plain.af.h5") + 1.0);
 }
@@ -170,7 +171,7 @@ TEST_F(MeasuredFields, RefuseProjectionsWithoutAPose) {
 }
 
 TEST_F(MeasuredFields, RefuseProjectionsOfAnotherPose) {
-  // The CT half a turn about the axis, which no head looks alike after.
+  // The CT is half a turn about the axis away, and no head looks the same after that.
   expect_refused(3,
                  "must be X-rays of this CT",
                  edited("gold_room_from_ct = [[1.0, 0.0, 0.0, 0.0]",

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Two jobs that write the same output: the second is refused by name, whichever program it is of,
-// and what the first writes is its own as a whole.
+// When two jobs write the same output, the second is refused by name, whichever program it is. The
+// first writes its whole output undisturbed.
 #include <csignal>
 #include <filesystem>
 #include <sstream>
@@ -59,8 +59,8 @@ class OutputLocks : public testing::Test {
            " --camera AP --translation-mm=" + std::to_string(offset_mm) + ",0,0 -o " + path(file);
   }
 
-  /// Starts a job and holds it once its lock says who it is; runs another meanwhile, which is
-  /// refused; then lets the first end.
+  /// Starts a job, and stops it once its lock says who it is. Another job must then be refused. At
+  /// last the first may end.
   void expect_second_is_refused(const std::string& first_arguments,
                                 const std::string& second_arguments,
                                 const std::string& lock) {

@@ -55,14 +55,14 @@ uncertainty=(prefix/libexec/attenuation-fields/jobs/uncertainty.py --presets fas
 # gc, all, both of clean X-rays, and all of spines; then gc, all and spines of odd numbers.
 [[ $(wc -l <uncertainty.csv) == 9 ]] || fail "uncertainty.py wrote $(cat uncertainty.csv)"
 grep -q '^gc,"all, as stated",' uncertainty.csv || fail "uncertainty.py wrote $(cat uncertainty.csv)"
-# Fields are too coarse for a success, which a fit needs: here is one. What the programs state is what the script would
-# by their constants.
+# Fields are too coarse for a success, which a fit needs, so one is written by hand. What the programs state is what the
+# script would state by their constants.
 cp -r pop right
 awk -F, -v OFS=, 'NR == 1 { for (i = 1; i <= NF; ++i) if ($i == "tre_mm") tre = i } NR == 2 { $tre = 0.5 } 1' \
   pop/runs/clean-2-fast/spine-001/registrations.csv >right/runs/clean-2-fast/spine-001/registrations.csv
 "${uncertainty[@]}" right >fitted 2>err || fail "uncertainty.py: $(cat err)"
 grep -q '^constexpr Confidence kOverRegions{' fitted || fail "uncertainty.py fitted $(cat fitted)"
-# By folds: a second patient, whom the first one's constants foretell. One patient alone leaves nothing to fit.
+# With folds, the first patient's constants predict the second. A patient alone leaves nothing to fit.
 sed 's/^spine-001/spine-002/' right/runs/clean-2-fast/spine-001/registrations.csv >second.csv
 cp -r right two-patients
 cp -r two-patients/runs/clean-2-fast/spine-001 two-patients/runs/clean-2-fast/spine-002
@@ -113,7 +113,7 @@ grep -q '^measure gc  half all, as stated' out || fail "uncertainty.py of one vi
 refuse 4 'holds no finished run of clean-2-fast' "${uncertainty[@]}" missing
 refuse 4 'has the same patient, too' "${uncertainty[@]}" pop pop
 refuse 4 'its folder is missing' "${uncertainty[@]}" pop --judge --csv nowhere/uncertainty.csv
-# Damaged tables; patients of even numbers alone, of whom nothing can be fitted.
+# Refuses damaged tables, and patients of even numbers alone, which are never fitted.
 for damage in 's/,squared_distance//' '2s/,.*//' "2,\$d" 's/^spine-001/spine-002/'; do
   rm -rf damaged
   cp -r pop damaged

@@ -5,8 +5,8 @@
 #   precompute_program.sh AF_PRECOMPUTE MPIEXEC SECTION [sanitized]
 #
 # SECTION: refusals, spacing, ranks, budget, memory, corrections or stops, a function below.
-# sanitized: the program was compiled with a sanitizer, which takes memory and time of its own: what memory it takes is not
-# judged, its limit is larger, and it runs on at most 4 ranks.
+# sanitized: the program was compiled with a sanitizer, which takes memory and time of its own. Its memory is not judged,
+# its limit is larger, and it runs on at most 4 ranks.
 set -euo pipefail
 
 # shellcheck source=tests/programs/body_ct.sh
@@ -95,7 +95,8 @@ refusals() {
   [[ -z $(find . -name '*.h5*') ]] || fail 'the dry run wrote a file'
 }
 
-# Nodes by their spacing: those of the design, or just as many more as let them stand no farther apart on any (s,t) plane.
+# With a spacing, a field has the design's nodes, or just as many more as it takes to stand no farther apart on any (s,t)
+# plane.
 spacing() {
   spaced=("${common[@]:0:8}" --uv-nodes 9 --codewords 200 --training-fraction 0.5)
   expect 2 'excludes' "${spaced[@]}" --st-nodes 64 --st-spacing-mm 4 -o refused.h5
@@ -125,7 +126,8 @@ spacing() {
   grep -q '256 x 256 nodes' out || fail "a wide spacing took nodes away: $(cat out)"
 }
 
-# Of every number of ranks with every size, caster and number of slabs, and with every pair of these: half of the combinations.
+# Half of all combinations, in which every number of ranks meets every size, caster and number of slabs, and every pair of
+# these.
 ranks() {
   hashes=()
   local i odd=0
@@ -160,8 +162,8 @@ ranks() {
   [[ $(printf '%s\n' "${hashes[@]}" | sort -u | wc -l) == 8 ]] || fail 'sizes, casters or slabs make no difference'
 }
 
-# A budget chooses the design by a probe: the same on any number of ranks, near the size asked for, the same in a dry run,
-# and what is stated stays.
+# With a budget, a probe chooses the design: the same on any number of ranks and in a dry run, and near the size asked for.
+# What the user states stays.
 budget() {
   budget=("${common[@]:0:8}" --max-field-size 1500kB --slabs 2)
   "$program" "${budget[@]}" -o budget.h5 >budget.txt 2>budget.err || fail "a budget: $(cat budget.err)"
@@ -173,8 +175,8 @@ budget() {
   [[ $(grep chosen dry.err) == "$(grep chosen budget.err)" ]] || fail 'a dry run chooses another design'
 }
 
-# Tiles of 200 MB under a limit that holds a fraction of them: read back and cast again give the payload of tiles kept,
-# and no rank exceeds the limit.
+# The memory limit holds a fraction of 200 MB of tiles. Tiles that are read back or cast again give the same payload as
+# tiles that are kept, and no rank exceeds the limit.
 memory() {
   large=(--ct ct.mha --rig c-arm-12in --camera AP --max-translation-mm 5 --uv-nodes 48 --st-nodes 900 --codewords 500)
   large+=(--max-training-tiles 50000)
@@ -191,7 +193,7 @@ memory() {
   done
 }
 
-# What was refused after casting does not stand in the way of better options: they use its units or replace them.
+# A run that was refused after casting does not hinder one with better options, which uses its units or replaces them.
 corrections() {
   for better in '9 61 200' '8 64 100'; do
     read -r uv st codewords <<<"$better"
@@ -203,7 +205,7 @@ corrections() {
   done
 }
 
-# A slow run (fine steps), stopped by SIGUSR1 on two ranks, resumed on one; another sampling in between is refused.
+# A slow run (fine steps) is stopped by SIGUSR1 on two ranks, and resumed on one. Another sampling in between is refused.
 stops() {
   slow=(--ct ct.mha --rig c-arm-12in --camera AP --uv-nodes 25 --st-nodes 161 --codewords 200)
   slow+=(--max-translation-mm 30 --caster trilinear --step-mm 0.05)
@@ -225,7 +227,7 @@ stops() {
   expect 3 'slabs = 2: the unfinished work was begun with 1' "${slow[@]}" --slabs 2 -o slow.h5
   LC_ALL=C sed 's/^Offset = -46 /Offset = -39 /' ct.mha >moved.mha
   expect 3 "CT 'ct' = .* 7 mm off: the unfinished work was begun with" --ct moved.mha "${slow[@]:2}" -o slow.h5
-  # Another format may keep fewer digits of where the same CT lies, and so of its centre.
+  # Another format may keep fewer digits of the CT's place, and so of its centre.
   LC_ALL=C sed 's/^Offset = -46 /Offset = -46.0004 /' ct.mha >same.mha
   expect 3 'slabs = 2: the unfinished work was begun with 1' --ct same.mha "${slow[@]:2}" --slabs 2 -o slow.h5
   ! grep -q "CT 'ct'\\|ct_mm" err || fail "the same CT is refused: $(cat err)"

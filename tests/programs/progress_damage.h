@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What may befall the files of unfinished work between two runs.
+// Ways in which the files of unfinished work may be damaged between two runs.
 #pragma once
 
 #include <algorithm>
@@ -34,7 +34,7 @@ inline void PrintTo(Damage damage, std::ostream* out) {
   *out << name_of(damage);
 }
 
-/// The files of a folder, by name: the same draw finds the same one.
+/// The files of a folder, sorted by name, so that the same draw finds the same file.
 inline std::vector<std::filesystem::path> files_of(const std::filesystem::path& folder) {
   std::vector<std::filesystem::path> files;
   for (const auto& entry : std::filesystem::directory_iterator(folder))
@@ -56,7 +56,7 @@ inline void flip_bytes(const std::filesystem::path& file, std::mt19937_64& rando
   }
 }
 
-/// Damages a file of a folder and says which. A swap is with any other.
+/// Damages a file of a folder, and returns which. A swap exchanges it with any other.
 inline std::string damage_a_file(const std::filesystem::path& folder,
                                  Damage damage,
                                  std::mt19937_64& random) {

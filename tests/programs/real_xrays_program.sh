@@ -33,7 +33,7 @@ job() {
 job scan || fail "real-xrays.sh: $(cat out err)"
 grep -q 'Geometry of the scan: .*scan/scan.toml' out || fail "it did not say which geometry it took: $(cat out)"
 grep -q '^  source_to_detector_mm = 900' out || fail "a stated distance was not kept: $(cat out)"
-# Two views of 4 mm pixels: every start up to 8 mm ends right.
+# With two views of 4 mm pixels, every start up to 8 mm ends right.
 grep -q '^| pair-01-fast | .* | 100 \[51, 100\] / - / - | 4 / 0 / 0 |' study/methods.md || fail "not all starts ended right: $(cat study/methods.md)"
 [[ -s study/report.html ]] || fail "no report"
 [[ $(grep -c '^field ' out) == 2 ]] || fail "two presets share the fields of two cameras: $(cat out)"
@@ -41,8 +41,8 @@ grep -q '^| pair-01-fast | .* | 100 \[51, 100\] / - / - | 4 / 0 / 0 |' study/met
 job scan || fail "the same command again: $(cat out err)"
 ! grep -q ' min \| s$' out || fail "a finished stage ran again: $(cat out)"
 
-# Without --field, robust has fields of its own, (s,t) nodes at most half a voxel of this scan's CT apart. They take minutes: here they
-# are planned alone.
+# Without --field, robust has its own fields, with (s,t) nodes at most half a voxel of this scan's CT apart. They take
+# minutes, so here they are only planned.
 rm prefix/bin
 mkdir prefix/bin
 ln -s "$programs"/af-* prefix/bin/
@@ -61,7 +61,7 @@ half=$(awk '/^ct_voxel_mm/ { printf "%.4f", $3 / 2 }' study/study/calibration.to
 grep -q -- "--preset standard --codewords 65536 --st-spacing-mm $half .*-robust.af.h5" asked || fail "robust's fields: $(cat asked)"
 grep -q '(s,t) nodes at most .* along each side' planned || fail "robust's fields cannot be planned: $(cat planned)"
 
-# The same views by lists beside a scan file elsewhere. A changed list is a changed scan.
+# The same views, from lists beside a scan file elsewhere. A changed list is a changed scan.
 mkdir lists
 for view in {0..71}; do
   printf 'view-%04d.mha\n' "$view" >>lists/files.txt

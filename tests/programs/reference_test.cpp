@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// docs/reference/ is what the programs print of themselves and what the code knows of its files;
-// field-format.md, which is written by hand, has the code's rules.
-// After a change: AF_WRITE_REFERENCE=1 build/release/tests/reference_tests
+// docs/reference/ must be what the programs print about themselves and what the code knows of its
+// files. field-format.md is written by hand, and must have the code's rules. After a change:
+// AF_WRITE_REFERENCE=1 build/release/tests/reference_tests
 #include <cstdlib>
 #include <sstream>
 #include <string>
@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The page in the tree is `text`; or becomes it, when that is asked for.
+/// Expects the page in the tree to be `text`, or writes it when AF_WRITE_REFERENCE is set.
 void expect_page(const std::string& name, const std::string& text) {
   const fs::path path = fs::path(AF_SOURCE_FOLDER) / "docs" / "reference" / name;
   if (std::getenv("AF_WRITE_REFERENCE") != nullptr) write_text_file(path, text);
@@ -29,7 +29,7 @@ void expect_page(const std::string& name, const std::string& text) {
       << path << " differs from the code: AF_WRITE_REFERENCE=1 " << AF_REFERENCE_PROGRAM;
 }
 
-/// A dataset's row in field-format.md, but for what it says of it.
+/// A dataset's row in field-format.md, without the description.
 std::string row_of(const field_layout::DatasetRule& rule) {
   std::ostringstream out;
   out << "| `" << rule.name << "` | " << to_string(rule.type) << " | ";
@@ -117,7 +117,7 @@ TEST(Reference, OfFilesIsWhatTheCodeKnows) {
   expect_page("files.md", file_page());
 }
 
-/// But for the datasets of tiles, whose extents the lattice decides: test_field_format.py has them.
+/// Datasets of tiles are left to test_field_format.py, because the lattice decides their extents.
 TEST(Reference, OfFieldFilesHasTheRulesOfTheCode) {
   using namespace field_layout;
   std::vector<std::string> texts = {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// af-register and af-drr as a user meets them: files, exit codes, messages.
+// What a user meets in af-register and af-drr: files, exit codes, messages.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -78,7 +78,7 @@ class ProgramTest : public testing::Test {
   static inline test::ScratchFolder* study_folder = nullptr;
 };
 
-/// The 36 x 36 pixels of 2 mm at the isocentre see half a millimetre at best through a small field.
+/// Through a small field, 36 x 36 pixels of 2 mm at the isocentre tell half a millimetre at best.
 constexpr double kFieldTreMm = 1.0;
 /// See registration_test.cpp: the X-rays are this very ray caster's DRRs.
 constexpr double kRayCastTreMm = 0.5;
@@ -126,7 +126,7 @@ TEST_F(RegisterProgram, SearchesWhereNoStartIsKnown) {
   EXPECT_NE(alone.output.find("search      "), std::string::npos) << alone.output;
   const nlohmann::json found = result("searched");
   EXPECT_LT(found.at("tre_mm").get<double>(), kRayCastTreMm);
-  // A small patient has few places that are alike and apart.
+  // A small patient has few separate places that look alike.
   const std::size_t starts = found.at("start_search").at("likeness_per_start").size();
   EXPECT_TRUE(starts == 1 || starts == 2) << starts;
   EXPECT_GT(found.at("start_search").at("rotations").get<int>(), 1);
@@ -354,7 +354,8 @@ TEST_F(RegisterProgram, ManyStartsGoOnAfterAStop) {
   EXPECT_EQ(result("stopped").at("trace"), result("whole").at("trace"));
 }
 
-/// The study with fiducials, as NAME.toml; each adds `marker` to the X-rays' pixel in its middle.
+/// Writes the study with fiducials as NAME.toml. Each adds `marker` to the X-rays' pixel at its
+/// middle.
 void write_study_with_fiducials(const fs::path& folder, const std::string& name, float marker) {
   Study study = read_study(folder / "study.toml");
   StudyCase& study_case = study.cases.front();
@@ -436,7 +437,7 @@ TEST_F(RegisterProgram, RefusesAFieldOfAnotherCtAndNamesBothHashes) {
   expect_refused(run, 4, identity_of(ct).content_sha256);
   EXPECT_NE(run.output.find(identity_of(test::five_ellipsoids()).content_sha256),
             std::string::npos);
-  // Told not to look, it does not; nor does the CT need to be there.
+  // With --skip-ct-check it does not look, and the CT may be missing.
   fs::remove(other / "ct.nii.gz");
   const test::ProgramRun unchecked = test::run_command(command + " --skip-ct-check");
   EXPECT_EQ(unchecked.exit_code, 0) << unchecked.output;
@@ -453,7 +454,7 @@ TEST_F(RegisterProgram, EndsTheSameAndRefusesTheSameWhereItKnowsTheCtFromBefore)
                              (other / "study.toml").string() + fields() +
                              " --max-evaluations 20 -o " + (other / "out").string());
   };
-  /// Of the same command, but for times.
+  /// The result of the same command, without times.
   const auto ended = [&] {
     fs::remove_all(other / "out");
     const test::ProgramRun registered = run();
@@ -493,8 +494,8 @@ TEST_F(RegisterProgram, RefusesAFieldOfACtThatLiesElsewhereButNotOfOneInAnotherF
   const std::string named = "ct.nii.gz";
   ASSERT_NE(study.find(named), std::string::npos) << study;
   const std::string field = path("AP.af.h5");
-  const auto registered = [&](const CtVolume& of, const std::string& name) {
-    write_ct(of, other / name);
+  const auto registered = [&](const CtVolume& other_ct, const std::string& name) {
+    write_ct(other_ct, other / name);
     write_text_file(other / "study.toml",
                     std::string(study).replace(study.find(named), named.size(), name));
     return test::run_command(program("af-register") + " --study " +
@@ -508,8 +509,9 @@ TEST_F(RegisterProgram, RefusesAFieldOfACtThatLiesElsewhereButNotOfOneInAnotherF
   const test::ProgramRun same = registered(ct, "ct.nrrd");
   EXPECT_EQ(same.exit_code, 0) << same.output;
   EXPECT_EQ(compared("ct.nrrd").exit_code, 0);
-  for (const auto& [name, of] : {std::pair("moved.mha", moved), std::pair("scaled.mha", scaled)}) {
-    expect_refused(registered(of, name), 4, "AP.af.h5: CT of the field: expected");
+  for (const auto& [name, other_ct] :
+       {std::pair("moved.mha", moved), std::pair("scaled.mha", scaled)}) {
+    expect_refused(registered(other_ct, name), 4, "AP.af.h5: CT of the field: expected");
     expect_refused(compared(name), 4, "mm off");
   }
 }
@@ -719,10 +721,11 @@ TEST_F(DrrProgram, RefusesASourceBehindOrWithinTheCt) {
   const std::string out = " -o " + path("behind.mha");
   const std::string said =
       "2304 of 2304 rays miss its planes, or attenuation lies behind or around";
-  // The CT is moved onto its source and behind it.
+  // The CT is moved onto the source, and behind it.
   for (const char* y : {"-650", "-700"})
     expect_refused(run_drr(field + "--translation-mm=0," + y + ",0" + out), 3, said);
-  // A source behind, within and on the (s,t) plane, whose lines all lie within the field's planes.
+  // The source is behind, within and on the (s,t) plane, and the lines of all its rays lie within
+  // the field's planes.
   CameraRig rig = read_rig(path("rig.toml"));
   CameraGeometry& camera = rig.cameras.front();
   camera.pixel_spacing_mm *= 0.2;
@@ -738,7 +741,7 @@ TEST_F(DrrProgram, RefusesASourceBehindOrWithinTheCt) {
 
 TEST_F(DrrProgram, SaysThatAPoseIsBeyondTheRangeThatTheFieldStates) {
   const std::string field = "--field " + path("AP.af.h5") + " -o " + path("towards-source.mha");
-  // Towards the source, where the field holds the rays of more than its 12 mm.
+  // The CT moves towards the source, where the field holds rays of more than its 12 mm.
   const test::ProgramRun beyond = run_drr(field + " --translation-mm=0,13,0");
   EXPECT_EQ(beyond.exit_code, 0) << beyond.output;
   EXPECT_NE(
@@ -750,8 +753,8 @@ TEST_F(DrrProgram, SaysThatAPoseIsBeyondTheRangeThatTheFieldStates) {
   EXPECT_EQ(within.output.find("beyond"), std::string::npos) << within.output;
 }
 
-/// 14 degrees about the long axis leave a field of +-8 degrees; a second one, about that angle,
-/// holds them.
+/// 14 degrees about the long axis are outside a field of +-8 degrees. A second field about that
+/// angle holds them.
 TEST_F(ProgramTest, DrrTakesTheFieldThatHoldsAPose) {
   const std::string turned = path("AP-turned.af.h5");
   const test::ProgramRun made = test::run_command(

@@ -40,7 +40,7 @@ xray_domain = "intensity"
 dark_level = 500
 )";
 
-/// A detector off its place with a wobble.
+/// The detector is out of place and wobbles.
 ScanCalibration true_geometry(const CircularScan& scan) {
   ScanCalibration truth = ScanCalibration::nominal(scan, {2, sweep_of(scan)});
   truth.column_px.coefficients << 36.5, 0.0, 0.0, 0.4, -0.3, 0.0;
@@ -119,12 +119,13 @@ TEST_F(AfScan, MakesAStudyWhoseGoldPoseIsTheIdentity) {
                   .dot(study.rig.camera(pair.views[1].camera).beam_direction()),
               0.0,
               0.06);  // 3 degrees from a quarter turn, as odd views are 6 apart
-  // The CT shows the heaviest ball where the X-rays do: along the rays through it, in both views.
+  // The CT and both X-rays show the heaviest ball at the same place: along the rays through it.
   const Eigen::Vector3d ball = test::lopsided_balls()[2].center_mm;
   for (const StudyView& view : pair.views) {
     const Image2d xray = read_view_xray(view, study.rig.camera(view.camera)).attenuation;
     const Eigen::Vector2d pixel = study.rig.camera(view.camera).project(ball);
-    // 14 mm of 0.01 twice less the ball's, and 5 mm of 0.04 at least, next to 0.3 beside it.
+    // Beside this ball, the large one gives at most 28 mm of 0.01, less than 0.3. This ball adds 5
+    // mm of 0.04.
     EXPECT_GT(
         xray.at(static_cast<int>(std::lround(pixel.x())), static_cast<int>(std::lround(pixel.y()))),
         0.3F);
@@ -194,13 +195,13 @@ TEST_F(AfScan, RefusesAViewThatWasExposedOtherwise) {
   for (float& value : dark.pixels) value = std::round(500.0F + 0.1F * (value - 500.0F));
   write_image_u16(dark, image(30), 0.9, 0.9);
   expect_refused(3, "view 30");
-  // A lost frame: nothing above the dark level.
+  // A lost frame shows nothing above the dark level.
   std::fill(dark.pixels.begin(), dark.pixels.end(), 500.0F);
   write_image_u16(dark, image(30), 0.9, 0.9);
   expect_refused(3, "view 30");
 }
 
-/// Transmissions are what is left of counts over the open beam.
+/// A transmission is the share of the open beam's counts that is left.
 TEST_F(AfScan, TakesTransmissionsAsWellAsCounts) {
   std::string text = kScan;
   text.replace(text.find("dark_level = 500\n"), 17, "flat_level = 1.0\n");

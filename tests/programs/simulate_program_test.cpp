@@ -242,7 +242,7 @@ TEST_F(AfSimulate, RefusesBadInputByTheContractsCodesAndLeavesNothing) {
       {coarse + "--water-mu-per-mm 0.6", 3, "water_mu_per_mm"},
       {coarse + "--center-ct-mm 900,0,0", 3, "center_ct_mm"},
       {coarse + "--target-box-ct-mm 0,0,0,-1,5,5", 3, "target_box_ct_mm: must be [[low"},
-      // What a study would be refused for: more than 1e7 cells of 2 mm.
+      // A study with more than 1e7 cells of 2 mm would be refused.
       {coarse + "--target-box-ct-mm=-300,-300,-300,300,300,300", 3, "target_box_ct_mm: must be sm"},
       {coarse + "--rig " + bad_rig, 3, "camera"},
       {coarse + "--rig nowhere.toml", 4, "nowhere.toml"},
@@ -325,7 +325,7 @@ TEST_F(AfSimulate, DicomXaOfObliqueViewsGivesTheLineIntegralsOfMetaImageToTheBit
   EXPECT_EQ(run(coarse + "--ideal --xray-format dicom " + folder("floats")), 3);
 }
 
-/// What a bone of the drawn spine 7 adds to muscle of its shape, mm of water, in every pixel.
+/// What a bone of the drawn spine 7 adds, in every pixel, to muscle of its shape (mm of water).
 Eigen::ArrayXd shadow_of(const std::string& bone,
                          const CameraGeometry& camera,
                          const RigidTransform& room_from_bone) {
@@ -404,7 +404,7 @@ TEST_F(MovedT12, HasItsOwnPoseInTheTruthAndTheRestHasThatOfTheSameStudyWithoutIt
   EXPECT_NE(moved.note.find("T10 turned by "), std::string::npos) << moved.note;
   EXPECT_NE(read_text_file(scratch_ / "moved" / "provenance.json").find("T10 turned by "),
             std::string::npos);
-  // The pins' gold pose is the bone's.
+  // The gold pose from the pins must be the bone's.
   std::vector<FiducialView> views;
   for (const StudyView& view : moved.views)
     views.push_back({rig_.camera(view.camera), view.fiducials_px});
@@ -416,7 +416,8 @@ TEST_F(MovedT12, HasItsOwnPoseInTheTruthAndTheRestHasThatOfTheSameStudyWithoutIt
 }
 
 TEST_F(MovedT12, IsInTheXraysWhereItsPoseSaysAndPinsAreWithIt) {
-  // Discs and ribs where the bone was, and bodies before it, make the rest of the difference.
+  // The rest of the difference comes from discs and ribs where the bone was, and from bodies before
+  // it.
   constexpr double kLowest = 0.9;
   constexpr double kHighestOfAFlippedMotion = 0.7;  // 0.5 where shadows do not overlap
   const StudyCase& still = simulated("--ideal --no-fiducials", "still");

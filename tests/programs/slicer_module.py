@@ -7,8 +7,8 @@ Usage: slicer_module.py PROGRAM --check
        slicer_module.py PROGRAM [NAME=VALUE ...]     runs it as a user who fills in these values
 
 The rules are those of Slicer's execution model: its schema (ModuleDescription.xsd) and its parser
-(ModuleDescriptionParser). Where these differ, as for file-like parameters with a flag, which the
-schema does not know, the parser's word holds.
+(ModuleDescriptionParser). Where these differ, the parser decides. So the parser's file-like
+parameters with a flag are right, although the schema does not know them.
 """
 import re
 import subprocess
@@ -95,7 +95,7 @@ def parameters_of(program):
 
 
 def arguments(parameter, value):
-    """As vtkSlicerCLIModuleLogic writes them; `value` None: what the widget shows at first."""
+    """The words that vtkSlicerCLIModuleLogic writes. `value` None stands for what the widget shows at first."""
     flag = "--" + text_of(parameter, "longflag")
     if parameter.tag == "boolean":
         return [flag] if value == "true" else []

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Jobs of the small study that last long enough to be cut short in every stage.
+// Jobs on the small study that take long enough to be cut short in every stage.
 #pragma once
 
 #include <cstdlib>
@@ -9,8 +9,8 @@
 
 namespace af::test {
 
-/// What mpirun needs as root and on few cores; and a slow search, which training and encoding wait
-/// for.
+/// Sets what mpirun needs as root and on few cores, and a vector width that makes training and
+/// encoding slow.
 inline void prepare_slow_jobs() {
   setenv("OMPI_ALLOW_RUN_AS_ROOT", "1", 1);
   setenv("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1", 1);
@@ -18,7 +18,7 @@ inline void prepare_slow_jobs() {
   setenv("AF_VECTOR_BITS", "128", 1);
 }
 
-/// The test itself goes first, so that it does not miss a moment on a busy machine.
+/// The job yields to the test, so that the test does not miss a moment on a busy machine.
 inline std::vector<std::string> under_mpirun(int ranks, const std::vector<std::string>& command) {
   std::vector<std::string> all = {
       "nice", "-n", "5", AF_MPIEXEC, "--oversubscribe", "-n", std::to_string(ranks)};

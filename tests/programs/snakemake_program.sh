@@ -32,7 +32,7 @@ evaluate_options=(--preset paper --intervals 4 --starts-per-interval 8 --no-pict
 TEXT
 
 study=(study=study.toml resources=resources.sh)
-# A shell without job control, and what it starts, may ignore Ctrl-C.
+# Without job control, a shell and what it starts may ignore Ctrl-C.
 by_snakemake() { env --default-signal=INT snakemake --snakefile "$jobs/Snakefile" --cores 2 "$@"; }
 # refuse PATTERN WORD...: Snakemake with these words.
 refuse() {
@@ -45,10 +45,10 @@ refuse 'which study' --config output=refused
 refuse 'missing.toml: no such file' --config study=missing.toml output=refused
 [[ ! -e refused ]] || fail "a refused study left $(find refused)"
 
-# --cores keeps threads to two; a cluster is asked for three ranks.
+# --cores limits threads to two, but a cluster is asked for three ranks.
 by_snakemake --dry-run --config output='by snakemake' "${study[@]}" >out 2>&1 || fail "--dry-run: $(cat out)"
 [[ ! -e 'by snakemake' ]] || fail "a dry run left $(find 'by snakemake')"
-# asks RULE NUMBER WORD...: so many jobs of the rule are to run, and ask for this.
+# asks RULE NUMBER WORD...: NUMBER jobs of the rule are to run, and each asks for these words.
 asks() {
   local rule=$1 number=$2 asked word
   shift 2
@@ -61,7 +61,8 @@ asks precompute 4 'threads: 2' tasks=2 mem_mb=4096 mem_mb_per_cpu=2048 runtime=1
 asks evaluate 2 'threads: 2' tasks=3 mem_mb=1024 mem_mb_per_cpu=512 runtime=90 'mpi=srun --mpi=pmix --kill-on-bad-exit=1'
 asks report 1 tasks=1 mem_mb=2 runtime=6
 
-# A terminal's Ctrl-C reaches Snakemake, mpirun and its ranks alike: here as a process group (set -m), after the first rows.
+# A terminal's Ctrl-C reaches Snakemake, mpirun and its ranks alike. Here a process group (set -m) gets it after the first
+# rows.
 set -m
 by_snakemake --config output='by snakemake' "${study[@]}" >out 2>&1 &
 group=$!

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// DRRs of a tube's spectrum as a user meets them: fields of bone's part, af-drr, af-register.
+// What a user meets in DRRs of a tube's spectrum: fields of bone's part, af-drr, af-register.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -94,7 +94,7 @@ TEST_F(SpectrumPrograms, FieldsOfTwoMaterialsAgreeWithRayCasting) {
   const double of_one_energy = rms_difference(drr(by_field), drr(by_casting));
   const Image2d cast = drr(by_casting + kTube);
   const double of_the_tube = rms_difference(drr(by_field + kTube), cast);
-  // Slopes by all are up to 1.3 here, those by bone up to 0.6, and both fields err.
+  // Here the slope by all material is up to 1.3, that by bone up to 0.6, and both fields err.
   EXPECT_LT(of_the_tube, 2.0 * of_one_energy);
   // What the spectrum does to a DRR is far more than what the fields lose.
   EXPECT_GT(rms_difference(cast, drr(by_casting)), 5.0 * of_the_tube);

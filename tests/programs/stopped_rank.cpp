@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A program of which one rank stops while the others end.
+// A program in which one rank stops while the others end.
 #include <csignal>
 
 #include <CLI/CLI.hpp>

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 STUDY = Path(os.environ["AF_LIBRARY_STUDY"]).resolve()
-# Of register_program_test: what a small field shows of 2 mm pixels.
+# As in register_program_test: a small field and 2 mm pixels tell no more.
 LARGEST_TRE_MM = 1.0
 
 

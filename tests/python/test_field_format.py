@@ -22,7 +22,7 @@ STUDY = Path(os.environ["AF_LIBRARY_STUDY"])
 FIELDS = ("AP.af.h5", "AP.bone.af.h5", "AP.standard.af.h5", "AP.atlas.af.h5")
 EXAMPLE = Path(__file__).parents[2] / "examples" / "decode_viewpoint.py"
 PAGE = Path(sys.argv.pop(1)).read_text(encoding="utf-8")
-# So close to the middle between two nodes nobody can say which one is nearest. Positions below 1e4 mm are rounded to
+# So close to the middle between two nodes, rounding decides which one is nearest. Positions below 1e4 mm are rounded to
 # 2e-12 mm, some ten times on their way to a node's number, and nodes are more than 1 mm apart.
 TIE_NODES = 1e-9
 
@@ -52,7 +52,7 @@ def datasets_below(group):
 
 
 def name_on_page(item):
-    """That of a field of one slab."""
+    """The object's name in a field of one slab, which the page uses."""
     return re.sub(r"/slab_\d+", "/slab_0", re.sub(r"^/member_\d+/", "/", item.name))
 
 
@@ -61,12 +61,12 @@ def type_of(values):
 
 
 def extents_of(dataset):
-    """Of a text: its bytes."""
+    """The shape, or for a text its number of bytes."""
     return (dataset.dtype.itemsize,) if type_of(dataset) == "text" else dataset.shape
 
 
 def tiles_of(slab):
-    """The numbers of tiles of a group of tiles."""
+    """The numbers of tiles along the axes of a slab."""
     geometry = slab.parent.parent["geometry"]
     u, v = geometry["uv_nodes"][:]
     _, s, _, t = geometry[Path(slab.name).name]["stored_range"][:]
@@ -93,7 +93,7 @@ def sha256_of_tiles(slab):
 
 
 def payload_lines(group, *parts):
-    """Of a file's root or a member, in the order of the page."""
+    """The lines of a file's root or of a member, in the order of the page."""
     page = list(DATASETS)
 
     def place(dataset):
@@ -159,8 +159,8 @@ class FieldFormatTest(unittest.TestCase):
         for file in self.files:
             for item in [file, *objects_below(file)]:
                 is_dataset = isinstance(item, h5py.Dataset)
-                of = "dataset" if is_dataset else "file" if item.name == "/" else name_on_page(item)
-                expected = {name: kind for name, owner, kind in ATTRIBUTES if owner == of}
+                place = "dataset" if is_dataset else "file" if item.name == "/" else name_on_page(item)
+                expected = {name: kind for name, owner, kind in ATTRIBUTES if owner == place}
                 if is_dataset and "/field/" in item.name:
                     del expected["sha256"]
                 found = {name: type_of(np.asarray(value)) for name, value in item.attrs.items()}
@@ -215,7 +215,7 @@ class FieldFormatTest(unittest.TestCase):
         directions = pixels - source
 
         def nearest(plane_y_mm, axis, extent_mm, nodes):
-            """The nodes nearest to where rays meet a plane, and whether two are as near."""
+            """The nodes nearest to where rays meet a plane, and whether two are equally near."""
             shares = (plane_y_mm - source[1]) / directions[..., 1]
             first_mm, last_mm = extent_mm
             at = (source[axis] + shares * directions[..., axis] - first_mm) * (nodes - 1) / (last_mm - first_mm)

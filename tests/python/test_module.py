@@ -187,7 +187,7 @@ class FieldTest(unittest.TestCase):
         while not ended.wait(0.001):
             rounds += 1
         caller.join()
-        # A call that kept the interpreter to itself would leave a round or two before it.
+        # If the call kept the interpreter to itself, there would be time for only a round or two before it.
         self.assertGreater(rounds, 10)
 
     def test_threads_of_python_get_the_same_bits(self):
@@ -416,7 +416,7 @@ class CtTest(unittest.TestCase):
     def test_voxels_are_shared_both_ways(self):
         ct = af.Ct.read(STUDY / "ct.nii.gz")
         self.assertEqual(ct.hu.shape, tuple(ct.size)[::-1])
-        first, second = ct.hu, ct.hu  # held: memory of copies could be given out twice
+        first, second = ct.hu, ct.hu  # both are held, because copies might get the same memory in turn
         self.assertEqual(first.ctypes.data, second.ctypes.data)
         self.assertFalse(ct.hu.flags.writeable)
         voxels = ct.hu.copy()
@@ -491,7 +491,7 @@ class CtTest(unittest.TestCase):
             rows.append(np.concatenate([x, np.zeros(4), -column * x]))
             rows.append(np.concatenate([np.zeros(4), x, -row * x]))
         matrix = np.linalg.svd(np.array(rows))[2][-1].reshape(3, 4)
-        # The linear estimate has skew of rounding; its scale is free.
+        # Rounding gives the linear estimate some skew, and its scale is free.
         again = af.Camera.from_projection_matrix(
             "again", matrix / np.linalg.norm(matrix), camera.pixel_spacing_mm, camera.size_px
         )
@@ -519,7 +519,7 @@ class RegistrationTest(unittest.TestCase):
                 self.assertEqual(found.verdict, expected.verdict)
                 self.assertEqual(found.reason, expected.reason)
                 self.assertEqual(found.tre_mm, expected.tre_mm)
-                # Preset bone finds no bone's silhouette in ellipsoids, and both say so.
+                # Preset bone finds no bone's silhouette in ellipsoids, and both the module and the program say so.
                 self.assertEqual(expected.room_from_ct is None, preset == "bone")
                 if preset == "bone":
                     continue

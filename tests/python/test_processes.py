@@ -120,7 +120,7 @@ class InterruptTest(unittest.TestCase):
                 run.send_signal(signal.SIGINT)
                 output, errors = run.communicate(timeout=60)
                 self.assertEqual((run.returncode, errors), (0, ""))
-                # Asked ten times a second; the rest is for a machine that has other work.
+                # A call looks for Ctrl-C ten times a second. The rest is for a machine that has other work.
                 self.assertLess(float(output) - sent, 1.0)
 
     def test_a_handler_may_raise_what_it_likes_and_others_let_the_call_go_on(self):

@@ -181,7 +181,7 @@ class Pages(Copied):
         self.assertIn("0.456 mmmean mRPD of successesdepth off by 5.25 mm (median), 23.5 mm (95th percentile)", text)
         self.assertIn("5.25, 23.5", text)
         self.assertIn("which leaves out the depth", text)
-        # The figures are of the same error, which the rows have beside their TREs.
+        # The figures show the same error, which the rows have beside their TREs.
         (found,) = runs.find_runs([self.folder / "registration"])
         rows = self.rows("registration/registrations.csv")
         self.assertEqual([start["error_mm"] for start in found.starts], [float(row["mrpd_mm"]) for row in rows])
@@ -217,7 +217,7 @@ class Pages(Copied):
         kinds = ["registration", "error-budget", "similarity-curves", "image-quality", "field-parameters"]
         sound = {kind: self.summary(kind) for kind in kinds}
         made = 0
-        # Figures that are there are not drawn anew, which would take all the time.
+        # Existing figures are not drawn anew, which would take most of the time.
         for kind in kinds:
             for name in ("success-rate", "tre-scatter", "tre-histogram", "confidence", "psnr", "loss-split", "similarity-curves",
                          "field-parameters"):

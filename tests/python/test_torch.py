@@ -20,8 +20,8 @@ from attenuation_fields.torch import Drr, drr, finite_differences
 STUDY = Path(os.environ["AF_LIBRARY_STUDY"])
 ROTATION_DEG = (2.0, -1.5, 3.0)
 TRANSLATION_MM = (4.0, -5.0, 6.0)
-# Of the largest derivative of its kind (degrees or mm). Looked-up DRRs are piecewise linear between
-# nodes: a difference over a step is the mean of the slopes along it.
+# Relative to the largest derivative of its kind (degrees or mm). Looked-up DRRs are piecewise linear between nodes, so a
+# difference over a step is the mean of the slopes along it.
 TOLERANCE = 0.05
 
 
@@ -42,7 +42,7 @@ class TorchTest(unittest.TestCase):
 
     def test_gradients_agree_with_finite_differences(self):
         height, width = self.field.shape
-        # Waves of 14 and 18 pixels, which feel every motion.
+        # Waves of 14 and 18 pixels respond to every motion.
         weights = np.sin(0.45 * np.arange(width) + 0.3)
         weights = weights * np.cos(0.35 * np.arange(height)[:, None] - 0.2)
         parameters = np.array([*ROTATION_DEG, *TRANSLATION_MM])

@@ -10,7 +10,7 @@ trap 'rm -rf "$scratch" || true' EXIT
 "$cmake" --build "$build" --target python-wheel >"$scratch/log" || { cat "$scratch/log" >&2; exit 1; }
 wheel=("$build"/wheel/*.whl)
 ((${#wheel[@]} == 1)) || { echo "test_wheel: not one wheel: ${wheel[*]}" >&2; exit 1; }
-# What pip does with a wheel that has no scripts, with a check of its hashes.
+# This does what pip does with a wheel without scripts, and checks the hashes.
 "$python" -m wheel unpack --dest "$scratch" "${wheel[0]}"
 cd "$scratch"/attenuation_fields-*/
 unset PYTHONPATH LD_LIBRARY_PATH

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# jobs/submit.sh on a real Slurm of one node: a study of two patients from CT to report, once undisturbed and once with
-# a field and a case's registrations stopped by Slurm's TERM, queued again and finished; both must have given the same.
-# So must jobs/Snakefile, as jobs of the same Slurm, one of which is stopped.
+# Runs jobs/submit.sh on a real Slurm of one node: a study of two patients from CT to report. It runs once undisturbed. It
+# runs again while Slurm's TERM stops a field and a case's registrations, which are queued again and finished. Both runs
+# must give the same, and so must jobs/Snakefile on the same Slurm, with one of its jobs stopped.
 # Usage: chain_test.sh [SCRATCH_FOLDER]. Needs root, the release build and jobs/install-packages.sh --with-slurm.
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
@@ -18,7 +18,7 @@ command -v snakemake >/dev/null || die 1 "snakemake is missing: jobs/install-pac
 finish() {
   local status=$?
   "$slurm" stop "$scratch/slurm" || true
-  # What was found does not depend on what can be removed.
+  # A folder that cannot be removed must not change the exit code.
   if ((status != 0)) || ! rm -rf "$scratch"; then
     say "What is left for a look: $scratch"
   fi
@@ -34,7 +34,7 @@ fail() {
   die 1 "$*"
 }
 
-# wait_until WHAT COMMAND... Long enough for a machine that is busy with other work.
+# wait_until WHAT COMMAND...: waits, long enough for a machine that is busy with other work.
 wait_until() {
   local deadline=$((SECONDS + 1200)) what=$1
   shift
@@ -44,7 +44,7 @@ wait_until() {
   done
 }
 
-# Without PMI each task would take itself for the whole job; one alone needs none.
+# Without PMI each task would take itself for the whole job. A single task needs no PMI.
 refused=0
 srun -n 2 --mpi=none "$bin/af-inspect" c-arm-12in >"$scratch/without-pmi.log" 2>&1 || refused=$?
 if ((refused != 2)) || ! grep -q 'SLURM_STEP_NUM_TASKS=2' "$scratch/without-pmi.log"; then
@@ -52,13 +52,13 @@ if ((refused != 2)) || ! grep -q 'SLURM_STEP_NUM_TASKS=2' "$scratch/without-pmi.
 fi
 srun -n 1 --mpi=none "$bin/af-inspect" c-arm-12in >"$scratch/one-task.log" || fail "one task without PMI does not run"
 
-# Two patients: the spine phantom twice, at different poses.
+# The two patients are the spine phantom at two poses.
 for seed in 1 2; do
   "$bin/af-simulate" --phantom spine --case "patient-$seed" --seed "$seed" -o "$scratch/patient-$seed" >"$scratch/simulate.log"
 done
 "$bin/af-evaluate" join-studies "$scratch/patient-1/study.toml" "$scratch/patient-2/study.toml" -o "$scratch/study.toml"
 
-# Work that lasts some seconds: what is stopped must be under way.
+# The work lasts some seconds, so that it is under way when it is stopped.
 cat >"$scratch/resources.sh" <<TEXT
 slurm_options=()
 launcher=${LAUNCHER:-srun}
@@ -73,7 +73,7 @@ precompute_options=(--max-rotation-deg 10 --max-translation-mm 30 --uv-nodes 30 
 evaluate_options=(--preset paper --starts-per-interval 8)
 TEXT
 
-# Slurm may fail to launch a step, and srun end with 0 all the same: the first evaluation meets that.
+# Slurm may fail to launch a step while srun still ends with 0. The first evaluation meets that here.
 mkdir "$scratch/bin"
 cat >"$scratch/bin/srun" <<TEXT
 #!/usr/bin/env bash
@@ -104,7 +104,7 @@ if [[ "${LAUNCHER:-srun}" == srun ]]; then
     fail "a step that was not launched went unseen"
 fi
 
-# stop_job NAME PROGRESS: TERM to the batch script once PROGRESS exists.
+# stop_job NAME PROGRESS: sends TERM to the batch script once PROGRESS exists.
 stop_job() {
   local name=$1 progress=$2 job
   wait_until "$progress" test -e "$progress"
@@ -133,12 +133,12 @@ done
 [[ "$(payloads_of "$disturbed")" == "$(payloads_of "$undisturbed")" ]] || fail "the fields differ"
 [[ "$(rows_of "$disturbed")" == "$(rows_of "$undisturbed")" ]] || fail "the rows differ"
 
-# Run again, nothing is left to do.
+# When the chain runs again, nothing is left to do.
 submit "$disturbed"
 wait_until "the chain that was done before" no_jobs_left
 [[ "$(grep -l 'done before' "$disturbed"/logs/*.log | wc -l)" == 6 ]] || fail "something was done twice"
 
-# A job that its owner cancels does not come back; the next chain goes on from what it had finished.
+# A job that its owner cancels does not come back. The next chain continues from what it had finished.
 rm "$disturbed/registration/patient-2/summary.json"
 submit "$disturbed"
 rows=$disturbed/registration/patient-2.progress/patient-2-field.0000-000000.records
@@ -154,8 +154,8 @@ wait_until "the chain after a cancelled one" no_jobs_left
 grep -q 'goes on after' "$disturbed/logs/evaluate-1.log" || fail "nothing of the cancelled job was taken over"
 [[ "$(rows_of "$disturbed")" == "$(rows_of "$undisturbed")" ]] || fail "the rows differ after the cancelled job"
 
-# By Snakemake. What runs when the first rows are there gets the TERM that Slurm sends before a time limit, and is
-# submitted again.
+# Snakemake must give the same. The job that runs when the first rows appear gets the TERM that Slurm sends before a time
+# limit, and is submitted again.
 by_snakemake=$scratch/run-snakemake
 mkdir -p "$scratch/profile" "$by_snakemake/logs"
 cat >"$scratch/profile/config.yaml" <<TEXT
@@ -180,7 +180,7 @@ fi
 [[ "$(payloads_of "$by_snakemake")" == "$(payloads_of "$undisturbed")" ]] || fail "the fields of Snakemake's run differ"
 [[ "$(rows_of "$by_snakemake")" == "$(rows_of "$undisturbed")" ]] || fail "the rows of Snakemake's run differ"
 
-# And without Slurm.
+# A run without Slurm must give the same, too.
 local_run=$scratch/run-local
 "$af_root/jobs/local.sh" "$scratch/study.toml" --resources "$scratch/resources.sh" --output "$local_run" --ranks 2
 [[ -s "$local_run/report.html" ]] || fail "no report.html of the local run"

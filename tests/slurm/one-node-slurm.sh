@@ -35,7 +35,7 @@ SlurmUser=root
 SlurmdUser=root
 AuthType=auth/munge
 CredType=cred/munge
-# A requeued job waits as long as credentials live.
+# A requeued job waits until its credentials expire, so they are made to expire soon.
 AuthInfo=cred_expire=5
 SlurmctldPort=26917
 SlurmdPort=26918
@@ -62,15 +62,15 @@ PartitionName=main Nodes=$host Default=YES MaxTime=INFINITE State=UP
 TEXT
 }
 
-# start_daemon FOLDER COMMAND...: a daemon that detaches; says why when it cannot start. Nothing that the caller holds
-# open may stay open in it.
+# start_daemon FOLDER COMMAND...: starts a daemon that detaches, or says why it cannot start. The daemon must not keep the
+# caller's files open.
 start_daemon() {
   local folder=$1
   shift
   "$@" </dev/null >"$folder/$1.out" 2>&1 || die "$1 does not start: $(last_words "$folder" "$1")"
 }
 
-# last_words FOLDER DAEMON...: what the daemons said and logged last.
+# last_words FOLDER DAEMON...: prints what the daemons said and logged last.
 last_words() {
   local folder=$1 file
   shift
@@ -106,7 +106,7 @@ start() {
   wait_for 30 node_is_ready || die "the node did not come up:$(last_words "$folder" slurmctld slurmd)"
 }
 
-# A zombie has ended, even where no init process buries it.
+# A zombie has ended, even if no init process reaps it.
 has_ended() { [[ ! -e "/proc/$1" ]] || grep -q '^State:[[:space:]]*Z' "/proc/$1/status"; }
 
 # end_daemon PIDFILE: returns once the process is gone, so that it writes nothing any more.

@@ -6,8 +6,8 @@
 
 namespace af::test {
 
-/// The camera of a C-arm that looks along +y: its source stands 650 mm before the room's origin,
-/// and its detector 370 mm behind, centred, with columns along x and rows along -z.
+/// The camera of a C-arm that looks along +y: its source is 650 mm before the room's origin. Its
+/// detector is 370 mm behind, centred, with columns along x and rows along -z.
 inline CameraGeometry c_arm_camera(int columns, int rows, double spacing_mm) {
   CameraGeometry camera;
   camera.name = "AP";

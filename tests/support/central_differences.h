@@ -13,8 +13,8 @@
 
 namespace af::test {
 
-/// Steps of central_difference_gradients(): by default large compared with single-precision noise
-/// of a DRR, small compared with its structures.
+/// Steps of central_difference_gradients(). The defaults are large compared with the
+/// single-precision noise of a DRR, and small compared with its structures.
 struct DifferenceSteps {
   double rotation_rad = 1e-3;
   double translation_mm = 0.1;
@@ -33,7 +33,7 @@ inline RigidTransform perturbed(const RigidTransform& room_from_ct,
   return pose_from_parameters(about_pivot, offset) * room_from_ct;
 }
 
-/// Derivatives by central differences of render(): the oracle of the renderers' own.
+/// Derivatives by central differences of render(), the oracle for the renderers' own.
 inline void central_difference_gradients(const DrrRenderer& renderer,
                                          const RigidTransform& room_from_ct,
                                          const View& view,
@@ -58,8 +58,8 @@ inline void central_difference_gradients(const DrrRenderer& renderer,
   }
 }
 
-/// How far a renderer's own derivatives are from central differences, relative to these, per
-/// parameter. The image that comes with derivatives must be that of render() alone.
+/// The relative distance of a renderer's own derivatives from central differences, per parameter.
+/// Also expects that the image with derivatives is that of render() alone.
 inline std::vector<double> gradient_distances(const DrrRenderer& renderer,
                                               const RigidTransform& room_from_ct,
                                               const View& view,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The operators are in a file of their own: where GCC 12 inlines them, it reports that malloc and
-// free do not match.
+// The operators are in a file of their own, because GCC 12 would inline them and report that malloc
+// and free do not match.
 #include "support/counted_allocations.h"
 
 #include <atomic>

@@ -3,8 +3,8 @@
 
 namespace af::test {
 
-/// Calls of operator new so far, of all threads. A program that links counted_allocations.cpp has
-/// its operators replaced by ones that count.
+/// Calls of operator new so far, of all threads. counted_allocations.cpp replaces the operators of
+/// a program that links it by ones that count.
 long allocation_count();
 
 }  // namespace af::test

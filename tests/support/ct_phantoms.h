@@ -23,15 +23,15 @@ struct Ellipsoid {
                                        const Eigen::Vector3d& through_point) const;
 };
 
-/// An axis-aligned box of constant HU in air (-1000 HU), its faces on voxel borders: the analytic
-/// test body of the casters.
+/// An axis-aligned box of constant HU in air (-1000 HU) with faces on voxel borders. Chords through
+/// it are known exactly, so it tests the casters.
 CtVolume box_phantom(const CtGrid& grid,
                      const std::array<int, 3>& first_voxel,
                      const std::array<int, 3>& last_voxel,
                      int hu);
 
-/// Bodies sampled on `grid`, each voxel the mean of `samples_per_axis`^3 points, air (-1000 HU)
-/// elsewhere.
+/// Bodies sampled on `grid` in air (-1000 HU). Each voxel is the mean of `samples_per_axis`^3
+/// points.
 CtVolume ellipsoid_phantom(const CtGrid& grid,
                            const std::vector<Ellipsoid>& bodies,
                            int samples_per_axis = 3);

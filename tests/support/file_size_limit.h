@@ -6,7 +6,7 @@
 
 namespace af::test {
 
-/// Limits the size of files this process can write, as a full disk would.
+/// Limits the size of files that this process can write, as a full disk would.
 class FileSizeLimit {
  public:
   explicit FileSizeLimit(rlim_t bytes) {

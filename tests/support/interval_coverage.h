@@ -6,15 +6,15 @@
 
 namespace af::test {
 
-/// Simulated studies of a number of patients, who differ: each has a success rate of its own,
-/// uniform in mean_rate +- half_spread, and a mean TRE of its own, log-normal about 0.3 mm with a
-/// standard deviation of the logarithm of 2 half_spread; every start is an independent draw (of TRE
-/// uniform in 0.5 to 1.5 times the patient's).
+/// Simulated studies of patients who differ. A patient's success rate is uniform in mean_rate +-
+/// half_spread. A patient's mean TRE is log-normal about 0.3 mm, and its logarithm has a standard
+/// deviation of 2 half_spread. Every start is an independent draw, with a TRE uniform in 0.5 to 1.5
+/// times the patient's mean.
 struct SimulatedStudies {
   std::size_t cases = 4;
   int starts_per_case = 24;
   double mean_rate = 0.8;
-  double half_spread = 0.2;  ///< 0: starts of all patients are alike, that is independent
+  double half_spread = 0.2;  ///< 0: patients do not differ, so all starts are independent
   std::uint64_t studies = 2000;
   std::uint64_t seed = 1;
   std::size_t replicates = 2000;  ///< of the bootstrap
@@ -32,8 +32,9 @@ struct IntervalCoverage {
 
 IntervalCoverage interval_coverage(const SimulatedStudies& setting);
 
-/// Simulated studies in which nearly all patients succeed from every start: each is hard with a
-/// probability of `hard_share`, and one that is loses about `lost_share` of the starts of one pose.
+/// Simulated studies in which nearly all patients succeed from every start. A patient is hard with
+/// a probability of `hard_share`. A hard patient loses about `lost_share` of the starts of one
+/// pose.
 struct StudiesOfRareFailures {
   std::size_t cases = 60;
   int poses = 3;
@@ -54,8 +55,8 @@ struct RareFailureCoverage {
 
 RareFailureCoverage rare_failure_coverage(const StudiesOfRareFailures& setting);
 
-/// Simulated studies of the distance between two methods' end poses: the patients' own means are
-/// log-normal about the margin itself, so that whoever claims equivalence is wrong.
+/// Simulated studies of the distance between two methods' end poses. The patients' own means are
+/// log-normal about the margin itself, so that every claim of equivalence is wrong.
 struct StudiesAtTheMargin {
   std::size_t cases = 10;
   double log_sd = 0.4;  ///< standard deviation of the logarithm of a patient's mean

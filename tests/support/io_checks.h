@@ -15,8 +15,7 @@
 
 namespace af::test {
 
-/// The message of the ErrorType that `action` throws; a failed expectation and "" for anything
-/// else.
+/// The message of the ErrorType that `action` throws. Anything else fails the test and returns "".
 template <typename ErrorType, typename Action>
 std::string message_of(const Action& action) {
   try {
@@ -31,14 +30,14 @@ std::string message_of(const Action& action) {
   return {};
 }
 
-/// Writes a small input file, without the syncing that outputs need. Removed first: file systems
-/// sync a file that is truncated and written anew.
+/// Writes a small input file, without the syncing that outputs need. Removes the file first,
+/// because file systems sync a file that is truncated and written anew.
 inline void write_input(const std::filesystem::path& path, const std::string& text) {
   std::filesystem::remove(path);
   std::ofstream(path, std::ios::binary) << text;
 }
 
-/// `text` with its first `from`, which must be there, replaced.
+/// `text` with its first `from` replaced. `from` must be there.
 inline std::string replaced(std::string text, const std::string& from, const std::string& to) {
   const std::size_t place = text.find(from);
   EXPECT_NE(place, std::string::npos) << from;

@@ -11,7 +11,7 @@ namespace af::test {
 
 using Triple = std::array<double, 3>;
 
-/// A regular grid of identity direction: ITK's caster ignores the direction.
+/// A regular grid of identity direction, because ITK's caster ignores the direction.
 struct ItkGrid {
   std::array<int, 3> size = {0, 0, 0};
   Triple spacing_mm = {1, 1, 1};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finished work as it is on disk, read by other code than the code under test.
+// Reads finished work from disk, by other code than the code under test.
 #pragma once
 
 #include <cstdint>
@@ -19,12 +19,14 @@ T number_at(const std::string& bytes, std::size_t position) {
   return number;
 }
 
-/// Whether a file holds records of the journal of this name; of any journal, if it is empty.
+/// Whether a file holds records of the journal of this name, or of any journal when the name is
+/// empty.
 inline bool is_of_journal(const std::filesystem::path& file, const std::string& journal) {
   return file.extension() == ".records" && file.filename().string().starts_with(journal);
 }
 
-/// The keys of the whole records of all processes and runs in a folder: of one journal, or of all.
+/// The keys of all complete records in a folder, of all processes and runs, from one journal or
+/// all.
 inline std::vector<std::int64_t> kept_keys(const std::filesystem::path& folder,
                                            const std::string& journal = {}) {
   std::vector<std::int64_t> keys;

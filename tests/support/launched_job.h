@@ -21,7 +21,7 @@ class LaunchedJob {
   LaunchedJob& operator=(const LaunchedJob&) = delete;
 
   [[nodiscard]] pid_t launcher() const { return launcher_; }
-  /// The processes that the launcher runs now.
+  /// The processes that the launcher is running.
   [[nodiscard]] std::vector<pid_t> ranks() const;
   [[nodiscard]] bool has_ended();
 

@@ -11,7 +11,7 @@
 
 namespace {
 
-/// The failures of a rank whose results nobody else prints.
+/// Prints the failures of a rank other than 0.
 class FailurePrinter : public testing::EmptyTestEventListener {
  public:
   explicit FailurePrinter(int rank) : rank_(rank) {}
@@ -33,8 +33,8 @@ class FailurePrinter : public testing::EmptyTestEventListener {
 
 }  // namespace
 
-/// Runs all tests on every rank; rank 0 prints all, the others what failed. The program fails when
-/// any rank failed.
+/// Runs all tests on every rank. Rank 0 prints all results, the others print their failures. The
+/// program fails when any rank failed.
 int main(int argc, char** argv) {
   const af::MpiEnvironment environment(argc, argv);
   testing::InitGoogleTest(&argc, argv);
@@ -42,7 +42,7 @@ int main(int argc, char** argv) {
   if (!world.is_root()) {
     auto& listeners = testing::UnitTest::GetInstance()->listeners();
     delete listeners.Release(listeners.default_result_printer());
-    listeners.Append(new FailurePrinter(world.rank()));  // which the list deletes
+    listeners.Append(new FailurePrinter(world.rank()));  // the list owns and deletes it
   }
   std::array<std::uint64_t, 1> failed{RUN_ALL_TESTS() == 0 ? std::uint64_t{0} : std::uint64_t{1}};
   world.sum(failed);

@@ -12,7 +12,7 @@
 
 namespace af::test {
 
-/// Gives this process, and what it starts, a user's cache of its own, empty at first.
+/// Gives this process, and those that it starts, their own user's cache, which is empty at first.
 class OwnCache {
  public:
   OwnCache() { use(scratch_.path()); }
@@ -30,7 +30,7 @@ class OwnCache {
 
   [[nodiscard]] std::filesystem::path folder() const { return scratch_ / "attenuation-fields"; }
 
-  /// Entries by name, each with the number of its file: an entry that is written anew has another.
+  /// Entries by name, each with its inode number, which changes when an entry is written anew.
   [[nodiscard]] std::map<std::string, ino_t> entries() const {
     std::map<std::string, ino_t> found;
     if (!std::filesystem::exists(folder())) return found;

@@ -16,8 +16,8 @@ ProgramRun run_command(const std::string& command);
 /// An option that stops a program at its first unit of work.
 constexpr const char* kStopAtOnce = " --max-hours 1e-9";
 
-/// Runs a command that can continue after a stop: first for 0.1 s, then twice as long, and so on
-/// until it ends by itself.
+/// Runs a command that can continue after a stop: first for 0.1 s, then for twice as long each
+/// time, until it ends by itself.
 ProgramRun run_until_done(const std::string& command);
 
 }  // namespace af::test

@@ -11,8 +11,8 @@
 
 namespace af::test {
 
-/// A folder that all ranks share. Made and removed by all of them together, so that none removes
-/// what another still reads. Collective.
+/// Collective. A folder that all ranks share. All of them make and remove it together, so that none
+/// removes what another still reads.
 class SharedFolder {
  public:
   SharedFolder() {
@@ -36,7 +36,7 @@ class SharedFolder {
   std::filesystem::path path_;
 };
 
-/// Removes a file that all ranks share, once none of them reads it any more. Collective.
+/// Collective. Removes a file that all ranks share, once none of them reads it any more.
 inline void remove_shared_file(const std::filesystem::path& path) {
   const Communicator world = Communicator::world();
   world.barrier();

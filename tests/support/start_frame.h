@@ -5,8 +5,8 @@
 
 namespace af::test {
 
-/// The start frame of a case whose gold pose is turned and shifted, and which turns about another
-/// point than the target box's centre.
+/// The start frame of a case whose gold pose is turned and shifted. It turns about a point that is
+/// not the target box's centre.
 inline evaluation::StartFrame example_start_frame() {
   evaluation::StartFrame frame;
   frame.case_name = "skull-01";

@@ -7,7 +7,7 @@
 
 namespace af::test {
 
-/// A folder of its own for the running test, removed on destruction.
+/// A folder for the running test alone, removed on destruction.
 class ScratchFolder {
  public:
   ScratchFolder();
@@ -22,10 +22,9 @@ class ScratchFolder {
   std::filesystem::path path_;
 };
 
-/// Fills a folder with what the tests of a program share. Only the first call of a process has it
-/// made, by `prepare`, and keeps a copy, from which the others fill theirs. Under CTest the entry
-/// NAME.prepared of the program keeps the copy (AF_PREPARE_INTO), and those of its tests take it
-/// (AF_PREPARED_IN).
+/// Fills a folder with what the tests of a program share. The first call of a process makes the
+/// contents with `prepare`, and keeps a copy for later calls. Under CTest the entry NAME.prepared
+/// keeps the copy (AF_PREPARE_INTO), and the entries of the tests use it (AF_PREPARED_IN).
 void prepare_once(const std::filesystem::path& folder, const std::function<void()>& prepare);
 
 }  // namespace af::test

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// example FIELD.af.h5 OUT.f32: looks a DRR up, writes its pixels as they are in memory, and says
+// example FIELD.af.h5 OUT.f32: looks up a DRR, writes its pixels as they are in memory, and says
 // how it changes with the pose. Errors have the text and the exit codes of the programs.
 #include <attenuation_fields/attenuation_fields.h>
 #include <cstddef>
