@@ -413,6 +413,24 @@ TEST(AfInspect, ListsWhereTheGoldPoseOfEveryCaseIsFrom) {
             "pins\tAP\tfiducials\npins\tLAT\tfiducials\n");
 }
 
+TEST(AfInspect, SaysThatARegionWithoutRoiIsAboutTheTargetBox) {
+  const ScratchFolder folder;
+  test::write_small_study(folder.path());
+  Study study = read_study(folder / "study.toml");
+  std::vector<StudyView>& views = study.cases.front().views;
+  views[0].roi = {6, 8, 30, 36};
+  views[1].is_roi_stated = false;
+  write_text_file(folder / "study.toml", study_to_toml(study, folder.path()));
+  const std::string path = (folder / "study.toml").string();
+  const json found = inspect_json(path)["facts"]["cases"][0]["views"];
+  EXPECT_EQ(found[0]["roi_px"], json({6, 8, 30, 36}));
+  EXPECT_FALSE(found[0].contains("region"));
+  EXPECT_FALSE(found[1].contains("roi_px"));
+  const std::string text = inspect(path).output;
+  EXPECT_THAT(text, HasSubstr("roi px: 6, 8, 30, 36\n"));
+  EXPECT_THAT(text, HasSubstr("region: the target box and a quarter of its sides"));
+}
+
 TEST(AfInspect, PrintsATemplateThatItAccepts) {
   const ScratchFolder folder;
   const test::ProgramRun printed = inspect("--template rig");
