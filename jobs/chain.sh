@@ -30,10 +30,13 @@ case_names=() most_views=0
 
 # read_chain: reads the cases and cameras of the study, and reports what is wrong with it.
 read_chain() {
-  local views case_name camera view_count
-  # There is one line per view: case, camera.
+  local views case_name camera gold view_count
+  # There is one line per view: case, camera, where the gold pose is from.
   views=$("$bin/af-inspect" --list-views "$study")
-  while IFS=$'\t' read -r case_name camera; do
+  while IFS=$'\t' read -r case_name camera gold; do
+    # The evaluation would refuse the case, but only once its fields are made.
+    [[ "$gold" != none ]] ||
+      die 3 "$study: case '$case_name' has neither three fiducials that two views show nor gold_room_from_ct: state either, or register it with af-register, which needs neither"
     [[ -v cameras_of["$case_name"] ]] || case_names+=("$case_name")
     cameras_of[$case_name]+="$camera"$'\n'
   done <<<"$views"

@@ -116,7 +116,7 @@ read -r -a robust_field_options <<<"$robust_field_words"
 declare -A cameras_of=()
 case_names=()
 views=$("$bin/af-inspect" --list-views "$study")
-while IFS=$'\t' read -r case_name camera; do
+while IFS=$'\t' read -r case_name camera _; do
   [[ -v cameras_of["$case_name"] ]] || case_names+=("$case_name")
   cameras_of[$case_name]+="$camera "
 done <<<"$views"

@@ -67,34 +67,44 @@ bool has_fiducial_gold(const Study& study, const StudyCase& study_case) {
          kFewestFiducials;
 }
 
+void require_gold(const Study& study, const StudyCase& study_case, const std::string& choice) {
+  const std::string source = gold_source(study, study_case);
+  if (choice == "auto" ? source != "none"
+                       : source == choice || (choice == "study" && study_case.gold_room_from_ct))
+    return;
+  throw InputError("gold",
+                   choice,
+                   "case '" + study_case.name + "' has " +
+                       (choice == "fiducials" ? "no three fiducials that two views show"
+                        : choice == "study"   ? "no gold_room_from_ct"
+                                              : "neither three fiducials that two views show nor "
+                                                "gold_room_from_ct: state either, or register it "
+                                                "with af-register, which needs neither"),
+                   study.path.string());
+}
+
+std::string gold_source(const Study& study, const StudyCase& study_case) {
+  if (has_fiducial_gold(study, study_case)) return "fiducials";
+  return study_case.gold_room_from_ct.has_value() ? "study" : "none";
+}
+
 GoldStandard gold_standard(const Study& study,
                            const StudyCase& study_case,
                            const std::string& choice) {
+  require_gold(study, study_case, choice);
   GoldStandard gold;
   add_fiducial_gold(study, study_case, gold);
   gold.stated_pose = study_case.gold_room_from_ct;
   if (gold.fiducials.has_value() && gold.stated_pose.has_value())
     gold.stated_to_fiducials_mm = mean_tre_mm(
         gold.fiducials->room_from_ct, *gold.stated_pose, target_points(study_case.target_box_ct));
-  const bool uses_fiducials =
-      choice == "fiducials" || (choice == "auto" && gold.fiducials.has_value());
-  if (uses_fiducials ? !gold.fiducials.has_value() : !gold.stated_pose.has_value())
-    throw InputError("gold",
-                     choice,
-                     "case '" + study_case.name + "' has " +
-                         (choice == "fiducials" ? "no three fiducials that two views show"
-                          : choice == "study"   ? "no gold_room_from_ct"
-                                                : "neither three fiducials that two views show nor "
-                                                  "gold_room_from_ct"),
-                     study.path.string());
-  gold.room_from_ct = uses_fiducials ? gold.fiducials->room_from_ct : *gold.stated_pose;
-  gold.source = uses_fiducials ? "fiducials" : "study";
+  gold.source = choice == "auto" ? gold_source(study, study_case) : choice;
+  gold.room_from_ct = gold.source == "fiducials" ? gold.fiducials->room_from_ct : *gold.stated_pose;
   return gold;
 }
 
 std::optional<GoldStandard> known_gold(const Study& study, const StudyCase& study_case) {
-  if (!study_case.gold_room_from_ct.has_value() && !has_fiducial_gold(study, study_case))
-    return std::nullopt;
+  if (gold_source(study, study_case) == "none") return std::nullopt;
   return gold_standard(study, study_case, "auto");
 }
 

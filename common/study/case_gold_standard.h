@@ -24,6 +24,13 @@ struct GoldStandard {
 /// Whether two views show at least three of the case's fiducials.
 bool has_fiducial_gold(const Study& study, const StudyCase& study_case);
 
+/// Throws InputError where gold_standard() has nothing to choose. It costs nothing, so it comes
+/// before work that takes long.
+void require_gold(const Study& study, const StudyCase& study_case, const std::string& choice);
+
+/// Where "auto" takes the gold pose of a case from: "fiducials", "study" or "none".
+std::string gold_source(const Study& study, const StudyCase& study_case);
+
 /// The gold standard of a case. `choice`: "fiducials", "study" (gold_room_from_ct) or "auto", which
 /// is fiducials when the case has them, else the stated pose. Throws InputError when the chosen one
 /// does not exist.

@@ -316,6 +316,8 @@ std::vector<StudyCase> chosen_cases(const RegistrationStudyOptions& options, con
                      "a field belongs to one CT: with several cases put the key `field` into the "
                      "study, or choose one by --case",
                      study.path.string());
+  // A case without a gold pose must not cost the registrations of those before it.
+  for (const StudyCase& study_case : cases) require_gold(study, study_case, options.gold);
   return cases;
 }
 

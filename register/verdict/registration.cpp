@@ -612,6 +612,8 @@ Judgement judgement_of(const RegistrationRecord& record) {
   }
   if (record.view_values.size() == 1 && judgement.verdict != Verdict::NotFound)
     reasons.push_back(depth_text(record.uncertainty.depth_95_mm));
+  if (record.uncertainty.target.has_no_answer)
+    reasons.emplace_back("not checked: whether the target has moved against the rest");
   if (!result.clipped_along.empty())
     reasons.push_back("the start lay outside the field's range along " + result.clipped_along +
                       " and was clipped into it");

@@ -111,7 +111,7 @@ class Registration {
 
 /// The verdict on a record by its confidence (judged_confidence()). It is not found where the
 /// search found nothing, and at least doubtful where something else leaves a doubt. The reason
-/// names all of it, and mentions a clipped start.
+/// names all of it, and mentions a clipped start and a target that could not be asked.
 Judgement judgement_of(const RegistrationRecord& record);
 
 /// Order of records by similarity, highest first. Those that are not found come after the others,

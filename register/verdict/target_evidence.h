@@ -7,7 +7,7 @@
 namespace af::registration {
 
 /// What the target alone says about an end, with everything else of the CT held there
-/// (TargetExaminer). NaN where it was not asked.
+/// (TargetExaminer). NaN where it was not asked, or has no answer.
 struct TargetEvidence {
   static constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
@@ -17,8 +17,10 @@ struct TargetEvidence {
   /// How far from the pose the target alone fits best: the mean displacement of its points across
   /// the beam, mm at the isocentre, in the view that shows it most.
   double apart_mm = kNone;
+  /// Whether it was asked and could not answer (TargetExaminer::evidence()).
+  bool has_no_answer = false;
 
-  auto members() { return std::tie(share, apart_mm); }
+  auto members() { return std::tie(share, apart_mm, has_no_answer); }
 };
 
 /// A target that fits farther than this from an end has moved relative to its surroundings. The two

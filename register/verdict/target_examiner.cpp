@@ -166,7 +166,7 @@ TargetEvidence TargetExaminer::evidence(const RigidTransform& room_from_ct) {
         answers_.emplace(place, answer_at(*problem_, pose_from_parameters(frame, held), threads_))
             .first;
   const std::optional<TargetAnswer>& answer = known->second;
-  if (!answer) return {};
+  if (!answer) return {TargetEvidence::kNone, TargetEvidence::kNone, true};
   return {
       answer->share,
       across_beam_mm(*problem_, problem_->target_points_ct, room_from_ct, answer->room_from_ct)};

@@ -34,7 +34,7 @@ class TargetExaminer {
   explicit TargetExaminer(std::shared_ptr<const RegistrationProblem> problem,
                           std::shared_ptr<ThreadPool> threads = nullptr);
 
-  /// No evidence where a view has no target_casts or does not see the target, where its X-ray shows
+  /// No answer where a view has no target_casts or does not see the target, where its X-ray shows
   /// no gradients there, and where a field does not hold the pose.
   [[nodiscard]] TargetEvidence evidence(const RigidTransform& room_from_ct);
 

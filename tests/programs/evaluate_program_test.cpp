@@ -639,6 +639,18 @@ TEST_F(EvaluateProgram, RefusesBadInputWithTheContractsCodes) {
   expect_refused(evaluate(study + "--field AP -o " + path("x")), 3, "must be CAMERA=PATH");
   expect_refused(evaluate(study + fields() + "--gold fiducials -o " + path("x")), 3, "fiducials");
   expect_refused(evaluate(study + fields() + "--case nobody -o " + path("x")), 3, "nobody");
+  // Without a gold pose, before a field is looked for or another case registered.
+  Study second = read_study(path("study.toml"));
+  second.cases.push_back(second.cases.front());
+  second.cases.back().name = "second";
+  second.cases.back().gold_room_from_ct.reset();
+  for (StudyCase& study_case : second.cases)
+    for (StudyView& view : study_case.views) view.field = path("missing.af.h5");
+  write_text_file(path("without-gold.toml"), study_to_toml(second, path("")));
+  expect_refused(
+      evaluate("registration --study " + path("without-gold.toml") + " -o " + path("x")),
+      3,
+      "case 'second' has neither three fiducials that two views show nor gold_room_from_ct");
   expect_refused(
       evaluate(study + fields() + "--raycast-intervals 3 --starts-per-interval 0 -o " + path("x")),
       3,

@@ -393,6 +393,44 @@ TEST(AfInspect, ListsAnglesOfCamerasThatLookAtTheSamePatient) {
   EXPECT_EQ(angles[0]["cameras"], json::array({"AP", "LAT"}));
 }
 
+TEST(AfInspect, ListsWhereTheGoldPoseOfEveryCaseIsFrom) {
+  const ScratchFolder folder;
+  test::write_small_study(folder.path());
+  Study study = read_study(folder / "study.toml");
+  study.cases.resize(3, study.cases.front());
+  study.cases[1].name = "without";
+  study.cases[1].gold_room_from_ct.reset();
+  study.cases[2].name = "pins";
+  study.cases[2].fiducials_ct_mm = {{20, 5, -8}, {-25, 10, 3}, {4, -22, 18}};
+  for (StudyView& view : study.cases[2].views)
+    for (const Eigen::Vector3d& point : study.cases[2].fiducials_ct_mm)
+      view.fiducials_px.push_back(
+          study.rig.camera(view.camera).project(*study.cases[2].gold_room_from_ct * point));
+  write_text_file(folder / "study.toml", study_to_toml(study, folder.path()));
+  EXPECT_EQ(inspect("--list-views " + (folder / "study.toml").string()).output,
+            "ellipsoids\tAP\tstudy\nellipsoids\tLAT\tstudy\n"
+            "without\tAP\tnone\nwithout\tLAT\tnone\n"
+            "pins\tAP\tfiducials\npins\tLAT\tfiducials\n");
+}
+
+TEST(AfInspect, SaysThatARegionWithoutRoiIsAboutTheTargetBox) {
+  const ScratchFolder folder;
+  test::write_small_study(folder.path());
+  Study study = read_study(folder / "study.toml");
+  std::vector<StudyView>& views = study.cases.front().views;
+  views[0].roi = {6, 8, 30, 36};
+  views[1].is_roi_stated = false;
+  write_text_file(folder / "study.toml", study_to_toml(study, folder.path()));
+  const std::string path = (folder / "study.toml").string();
+  const json found = inspect_json(path)["facts"]["cases"][0]["views"];
+  EXPECT_EQ(found[0]["roi_px"], json({6, 8, 30, 36}));
+  EXPECT_FALSE(found[0].contains("region"));
+  EXPECT_FALSE(found[1].contains("roi_px"));
+  const std::string text = inspect(path).output;
+  EXPECT_THAT(text, HasSubstr("roi px: 6, 8, 30, 36\n"));
+  EXPECT_THAT(text, HasSubstr("region: the target box and a quarter of its sides"));
+}
+
 TEST(AfInspect, PrintsATemplateThatItAccepts) {
   const ScratchFolder folder;
   const test::ProgramRun printed = inspect("--template rig");
@@ -429,7 +467,8 @@ TEST(AfInspect, VerifiesAFieldAndAStudyAndSeesDamage) {
   const json study_entry = inspect_json(study);
   EXPECT_EQ(study_entry["kind"], "study");
   EXPECT_EQ(study_entry["facts"]["cases"][0]["views"].size(), 2u);
-  EXPECT_EQ(inspect("--list-views " + study).output, "ellipsoids\tAP\nellipsoids\tLAT\n");
+  EXPECT_EQ(inspect("--list-views " + study).output,
+            "ellipsoids\tAP\tstudy\nellipsoids\tLAT\tstudy\n");
   std::string inputs;
   for (const char* name : {"ct.nii.gz", "rig.toml", "AP.mha", "LAT.mha"})
     inputs += "ellipsoids\t" + (folder / name).string() + "\n";

@@ -595,6 +595,20 @@ TEST_F(RegisterProgram, RequireFoundDoesNotAcceptADoubtfulPose) {
   expect_refused(run_register(whole), 0, "verdict     found: right with ");
 }
 
+TEST_F(RegisterProgram, WithoutTheCtSaysThatTheTargetWasNotChecked) {
+  const std::string arguments = fields() + " --preset fast --start-rotation-deg -1,0.5,2.5 -o ";
+  const std::string missing = "not checked: whether the target has moved against the rest";
+  const test::ProgramRun unread = run_register(arguments + path("ct-unread") + " --skip-ct-check");
+  expect_refused(unread, 0, missing);
+  const nlohmann::json alone = result("ct-unread");
+  EXPECT_EQ(alone.at("verdict"), "found");
+  EXPECT_TRUE(alone.at("uncertainty").at("target_share").is_null());
+  EXPECT_NE(alone.at("verdict_reason").get<std::string>().find(missing), std::string::npos);
+  const test::ProgramRun read = run_register(arguments + path("ct-read"));
+  EXPECT_EQ(read.output.find(missing), std::string::npos) << read.output;
+  EXPECT_TRUE(result("ct-read").at("uncertainty").at("target_share").is_number());
+}
+
 TEST_F(RegisterProgram, AStartThatCannotBeSearchedIsNotFound) {
   const std::string start = " --renderer raycast --start-translation-mm 0,0,500 -o ";
   const test::ProgramRun run = run_register(start + path("outside"));

@@ -43,6 +43,18 @@ refuse() {
 }
 refuse 'which study' --config output=refused
 refuse 'missing.toml: no such file' --config study=missing.toml output=refused
+# Before a field is made: the evaluation needs a gold pose.
+grep -v -e gold_room_from_ct -e fiducials study.toml >without-gold.toml
+no_gold="case 'patient-1' has neither three fiducials that two views show nor gold_room_from_ct: state either"
+refuse "$no_gold" --config study=without-gold.toml output=refused
+for script in run-study.sh submit.sh; do
+  words=(without-gold.toml --output refused) refused=0
+  [[ "$script" != submit.sh ]] || words+=(--dry-run)
+  "$jobs/$script" "${words[@]}" >out 2>&1 || refused=$?
+  if ((refused != 3)) || ! grep -q "$no_gold" out; then
+    fail "$script did not refuse a study without a gold pose: $(cat out)"
+  fi
+done
 [[ ! -e refused ]] || fail "a refused study left $(find refused)"
 
 # --cores limits threads to two, but a cluster is asked for three ranks.

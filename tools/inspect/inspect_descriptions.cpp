@@ -112,7 +112,12 @@ ordered_json view_json(const StudyCase& study_case,
   json["camera"] = view.camera;
   json["xray"] = view.xray.string();
   json["xray_domain"] = view.xray_domain == XrayDomain::Intensity ? "intensity" : "attenuation";
-  json["roi_px"] = {view.roi.column, view.roi.row, view.roi.width, view.roi.height};
+  // Without roi_px, view.roi is the whole detector, which registrations hardly ever compare.
+  if (view.is_roi_stated)
+    json["roi_px"] = {view.roi.column, view.roi.row, view.roi.width, view.roi.height};
+  else
+    json["region"] =
+        "the target box and a quarter of its sides; with --region study the whole detector";
   // Only those that the view shows count.
   json["fiducials"] = std::count_if(view.fiducials_px.begin(),
                                     view.fiducials_px.end(),

@@ -40,8 +40,8 @@ void InspectOptions::describe(Fields& field) {
   field("json", as_json, "Print one JSON array instead of text");
   field("list_views",
         lists_views,
-        "For scripts: print one line per view of a study, its case and camera with a tab between "
-        "them")
+        "For scripts: print one line per view of a study: case, camera, and where the gold pose is "
+        "from (fiducials, study or none), with tabs between them")
       .excludes({"--json"});
   field("list_inputs",
         lists_inputs,

@@ -16,6 +16,7 @@
 #include "files/output_file.h"
 #include "images/image_header.h"
 #include "ranks/progress_journal.h"
+#include "study/case_gold_standard.h"
 #include "study/matrix_text.h"
 #include "study/node_ct.h"
 #include "study/pose_file.h"
@@ -331,9 +332,12 @@ DrawnPictures draw_pictures(const fs::path& study_or_ct,
 
 std::string view_lines(const fs::path& study_path) {
   std::string lines;
-  for (const StudyCase& study_case : read_study(study_path).cases)
+  const Study study = read_study(study_path);
+  for (const StudyCase& study_case : study.cases) {
+    const std::string gold = gold_source(study, study_case);
     for (const StudyView& view : study_case.views)
-      lines += study_case.name + '\t' + view.camera + '\n';
+      lines += study_case.name + '\t' + view.camera + '\t' + gold + '\n';
+  }
   return lines;
 }
 

@@ -51,7 +51,8 @@ DrawnPictures draw_pictures(const std::filesystem::path& study_or_ct,
                             const CtReadOptions& ct_reading,
                             const std::filesystem::path& folder);
 
-/// For scripts: one line per view of a study, "case<tab>camera". Throws as read_study() does.
+/// For scripts: one line per view of a study, "case<tab>camera<tab>gold", where gold is
+/// gold_source(). Throws as read_study() does.
 std::string view_lines(const std::filesystem::path& study_path);
 
 /// For scripts: a line "case<tab>path" for every file that a study's cases read: CT, rig (unless it

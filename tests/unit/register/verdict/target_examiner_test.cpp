@@ -67,6 +67,7 @@ TEST(TargetExaminer, AgreesWithARigidPatient) {
   EXPECT_LT(evidence.apart_mm, 0.05);
   EXPECT_GT(evidence.share, 0.2);
   EXPECT_LE(evidence.share, 1.0);
+  EXPECT_FALSE(evidence.has_no_answer);
 }
 
 TEST(TargetExaminer, SaysTheSameWhateverItWasAskedBefore) {
@@ -88,7 +89,7 @@ TEST(TargetExaminer, SaysTheSameWhateverItWasAskedBefore) {
 TEST(TargetExaminer, SaysNothingWhereTheTargetCannotBeAsked) {
   const auto is_silent = [](const SmallCase& made) {
     const TargetEvidence evidence = TargetExaminer(made.problem).evidence(made.gold_room_from_ct);
-    return std::isnan(evidence.share) && std::isnan(evidence.apart_mm);
+    return evidence.has_no_answer && std::isnan(evidence.share) && std::isnan(evidence.apart_mm);
   };
   SmallCase without_ct = case_with(RigidTransform::Identity());
   without_ct.problem->views.back().target_casts.clear();

@@ -165,6 +165,18 @@ TEST(Judgement, ATargetThatDisagreesWithItsSurroundingsIsDoubtful) {
       "least 99.0 % wanted");
 }
 
+TEST(Judgement, SaysWhereTheTargetHasNoAnswer) {
+  const std::string missing = "; not checked: whether the target has moved against the rest";
+  for (const auto& [confidence, verdict] :
+       {std::pair(0.9968, Verdict::Found), {0.985, Verdict::Doubtful}}) {
+    RegistrationRecord record = record_with(confidence);
+    const std::string reason = judgement_of(record).reason;
+    record.uncertainty.target.has_no_answer = true;
+    EXPECT_EQ(verdict_of(record), verdict);
+    EXPECT_EQ(judgement_of(record).reason, reason + missing);
+  }
+}
+
 TEST(Judgement, AnAgreeingTargetDoublesTheOdds) {
   EXPECT_NEAR(confidence_if_target_agrees(0.5), 2.0 / 3.0, 1e-12);
   EXPECT_NEAR(confidence_if_target_agrees(0.99), 198.0 / 199.0, 1e-12);
