@@ -23,11 +23,15 @@ namespace {
 constexpr int kPixelsAcross = 64;
 /// Of the first look at all rotations, of which there are eight times fewer at twice the step.
 constexpr int kFirstPixelsAcross = 32;
-/// Modes of the first look at all rotations that are looked at again, with rotations between its
-/// own, and of these once more. Shafts of bones lie along each other at many places: one bone of a
-/// wrist was the 80th of the first look and the third of the second.
-constexpr std::size_t kFirstModes = 128;
-constexpr std::size_t kSecondModes = 32;
+/// How many modes of a look at all rotations are looked at again, with rotations between its own,
+/// and of these once more.
+struct ModesKept {
+  std::size_t first;
+  std::size_t second;
+};
+constexpr ModesKept kKept{8, 5};
+/// Shafts of bones lie along each other at many places.
+constexpr ModesKept kKeptInSilhouettes{128, 32};
 /// How far, in coarse pixels, points at the middle distance from the centre may move between
 /// neighbouring rotations. An edge that lies a pixel aside still overlaps, because edges are two to
 /// three pixels wide.
@@ -335,6 +339,7 @@ struct PoseSearch::Parts {
   std::optional<Looking> first;  ///< with a first look at all rotations
   Looking looking;
   std::vector<Eigen::Matrix3d> rotations;  ///< of the first look, if there is one
+  bool is_in_silhouettes;
 };
 
 void PoseSearchOptions::describe(Fields& field) {
@@ -431,7 +436,8 @@ PoseSearch::PoseSearch(const RegistrationProblem& problem,
                                     searched,
                                     std::move(first),
                                     std::move(looking),
-                                    searched_rotations(options, searched, step_rad)});
+                                    searched_rotations(options, searched, step_rad),
+                                    silhouette_mm > 0.0});
 }
 
 PoseSearch::~PoseSearch() = default;
@@ -450,13 +456,14 @@ std::vector<PoseMode> PoseSearch::modes() const {
   const auto count = static_cast<std::size_t>(parts_->options.modes);
   ThreadPool& threads = *parts_->threads;
   const Looking& looking = parts_->looking;
+  const ModesKept& kept = parts_->is_in_silhouettes ? kKeptInSilhouettes : kKept;
   std::vector<PoseMode> modes;
   if (parts_->first.has_value()) {
     const Looking& first = *parts_->first;
     const double step_rad = looking.rotation_step_rad;
-    modes = first.modes(parts_->rotations, std::max(count, kFirstModes), threads);
+    modes = first.modes(parts_->rotations, std::max(count, kept.first), threads);
     modes =
-        looking.modes_near(modes, step_rad, first.pixel_mm, std::max(count, kSecondModes), threads);
+        looking.modes_near(modes, step_rad, first.pixel_mm, std::max(count, kept.second), threads);
     modes = looking.modes_near(modes, 0.5 * step_rad, looking.pixel_mm, count, threads);
   } else {
     modes = looking.modes(parts_->rotations, count, threads);
