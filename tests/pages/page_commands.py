@@ -4,13 +4,13 @@
 
 Usage: page_commands.py --run PAGE PROGRAMS [DATA] runs all ```sh and ```python blocks of a page in one scratch folder
        page_commands.py --data DATA PROGRAMS      makes the small data of all pages once, in a new folder DATA
-       page_commands.py --check ROOT              blocks of every page are of a known kind, those that are not run say
-                                                  why, and name options that our programs have
+       page_commands.py --check ROOT              blocks of every page are of a known kind, name options that our
+                                                  programs have, and not_run.toml gives reasons for those not run
        page_commands.py --pages ROOT              prints the pages that have ```sh blocks
 
 A block marked ```sh is run, from the top of the page to its end, with small data of the names that our pages use
-(small_data.py); on such a page a ```python block, too. A block marked ```console shows commands that are not run; the
-line behind it begins with "*Not run by the tests:" and gives the reason. So may the line behind a ```python block.
+(small_data.py); on such a page a ```python block, too. A block marked ```console shows commands that are not run, and
+not_run.toml says why. A ```python block that stands there is not run either.
 """
 import os
 import re
@@ -18,28 +18,35 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import tomllib
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 SKIPPED = {".git", "build"}
 KINDS = {"", "sh", "console", "toml", "text", "python", "cpp", "cmake", "json", "csv", "xml", "latex"}
-EXCUSE = "*Not run by the tests:"
+NOT_RUN = tomllib.loads((HERE / "not_run.toml").read_text(encoding="utf-8"))
 
 
 def blocks_of(page):
-    """(kind, number of the first line, text, the first line that is not empty after it) of each fenced block."""
+    """(kind, number of the first line, text) of each fenced block."""
     lines = page.read_text(encoding="utf-8").splitlines()
     blocks, begin, kind = [], None, ""
     for number, line in enumerate(lines):
         if begin is None and line.startswith("```"):
             begin, kind = number + 1, line[3:].strip()
         elif begin is not None and line.startswith("```"):
-            behind = next((text for text in lines[number + 1 :] if text.strip()), "")
-            blocks.append((kind, begin + 1, "\n".join(lines[begin:number]), behind))
+            blocks.append((kind, begin + 1, "\n".join(lines[begin:number])))
             begin = None
     if begin is not None:
         sys.exit(f"{page}:{begin}: a block without an end")
     return blocks
+
+
+def entry_of(page, kind, text):
+    """Where a block of a page (below the root) stands in not_run.toml, if it does."""
+    first = next((line.strip() for line in text.splitlines() if line.strip() and not line.strip().startswith("#")), "")
+    beginnings = [begin for begin in NOT_RUN.get(page.as_posix(), {}) if first.startswith(begin)]
+    return max(beginnings, key=len, default=None) if kind in ("console", "python") else None
 
 
 def pages_below(root):
@@ -67,26 +74,31 @@ def unknown_options(text, options):
 
 def check(root):
     problems, options = [], known_options(root)
+    unused = {(page, begin) for page, entries in NOT_RUN.items() for begin in entries}
     for page in pages_below(root):
-        for kind, number, text, behind in blocks_of(page):
+        for kind, number, text in blocks_of(page):
             where = f"{page.relative_to(root)}:{number}"
+            entry = entry_of(page.relative_to(root), kind, text)
+            unused.discard((page.relative_to(root).as_posix(), entry))
             if kind not in KINDS:
                 problems.append(f"{where}: a block of the unknown kind '{kind}'")
-            if kind == "console" and not behind.startswith(EXCUSE):
-                problems.append(f"{where}: nothing says why this block is not run ('{EXCUSE} ...*' behind it)")
+            if kind == "console" and entry is None:
+                problems.append(f"{where}: tests/pages/not_run.toml does not say why this block is not run")
             if kind in ("console", "sh"):
                 problems += [f"{where}: there is no {name}" for name in unknown_options(text, options)]
-    for problem in problems:
+    problems += [f"tests/pages/not_run.toml: {page} has no block that begins with '{begin}'" for page, begin in unused]
+    for problem in sorted(problems):
         print(problem, file=sys.stderr)
     if problems:
         sys.exit(f"pages: {len(problems)} problems")
-    print(f"pages: {len(pages_below(root))} pages say which commands are run")
+    print(f"pages: of {len(pages_below(root))} pages, all commands but {sum(map(len, NOT_RUN.values()))} blocks are run")
 
 
 def script_of(page):
     parts = ["set -euo pipefail"]
-    for kind, number, text, behind in blocks_of(page):
-        if kind == "python" and not behind.startswith(EXCUSE):
+    below_root = page.resolve().relative_to(HERE.parent.parent)
+    for kind, number, text in blocks_of(page):
+        if kind == "python" and entry_of(below_root, kind, text) is None:
             text = f"/usr/bin/python3 -W error - <<'END OF PYTHON'\n{text}\nEND OF PYTHON"
         elif kind != "sh":
             continue
