@@ -19,7 +19,7 @@ std::string field_look_up_help();
 /// The look-up that a search uses in a field meant for `own`: `cubic-sum` instead of `cubic` where
 /// there are several slabs, otherwise `own`. A search also needs the slopes, and `cubic` inserts
 /// nodes into all three images. Over 64 poses of five anatomies, searches by `cubic-sum` end as
-/// near to the truth (docs/earlier-designs.md#eight-slabs).
+/// near to the truth (docs/other-designs.md#eight-slabs).
 std::string look_up_of_searches(const std::string& own, std::size_t slab_count);
 
 /// The renderer for a name of field_look_up_names(). Throws InputError for any other name. The
