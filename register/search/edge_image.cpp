@@ -206,10 +206,9 @@ void correlate(const EdgeImage& pattern,
 
 std::vector<std::int16_t> quarter_squares(const EdgeImage& image) {
   static_assert(EdgeImage::kLargestEdge * EdgeImage::kLargestEdge / 4 <= INT16_MAX);
-  std::vector<std::int16_t> squares(2 * static_cast<std::size_t>(image.width()) *
-                                    static_cast<std::size_t>(image.height()));
+  std::vector<std::int16_t> squares(image.edge_count() + kReadBeyond);
   std::transform(
-      image.edges(), image.edges() + squares.size(), squares.begin(), [](std::int16_t edge) {
+      image.edges(), image.edges() + image.edge_count(), squares.begin(), [](std::int16_t edge) {
         return static_cast<std::int16_t>(edge * edge / 4);
       });
   return squares;
@@ -223,7 +222,7 @@ void correlate_within(std::span<const std::uint8_t> used,
                       std::span<float> likeness) {
   require_within(pattern, image, window, likeness);
   check(2 * used.size() == pattern.edge_count(), "a pixel is used or not");
-  check(image_squares.size() >= image.edge_count(), "squares are of this image");
+  check(image_squares.size() == image.edge_count() + kReadBeyond, "squares are of this image");
   const std::vector<PatternPixel> edges = edge_pixels(pattern, used, image.width());
   const std::vector<PatternPixel> counted = ones(used, pattern.width(), image.width());
   const std::vector<std::int32_t> alike = products(edges, image.edges(), image, window);

@@ -243,8 +243,9 @@ void Looking::add_view(std::size_t view, const Turn& turn, Scratch& scratch) con
   // Where a field lacks rays, their zeros would be edges.
   if (!status.is_inside()) return;
   scratch.cuts_px.clear();
-  for (const Eigen::Vector3d& cut : problem.cut_points_ct)
-    scratch.cuts_px.emplace_back(seen.pattern.camera.project(room_from_ct * cut));
+  if (seen.silhouette_px > 0.0)
+    for (const Eigen::Vector3d& cut : problem.cut_points_ct)
+      scratch.cuts_px.emplace_back(seen.pattern.camera.project(room_from_ct * cut));
   const SearchedView::Part& part = turn.part->seen[view];
   scratch.likeness.resize(part.size());
   seen.compare(part, scratch.drr, scratch.cuts_px, scratch.likeness);

@@ -95,11 +95,21 @@ Steps depth_layers(const SearchedView& searched, const SeenTranslations& seen) {
           std::max(thickness_mm, 1e-3)};
 }
 
-/// The image enlarged about a point of it, by linear interpolation. Beyond its border is its
-/// border.
-Image2d scaled_about(const Image2d& image, const Eigen::Vector2d& fixed_px, double size) {
-  if (size == 1.0) return image;
+/// An image, and which pixels show something (1); empty: all.
+struct ScaledImage {
+  Image2d image;
+  std::vector<std::uint8_t> used;
+};
+
+/// The image enlarged about a point of it, by linear interpolation. Beyond its border nothing
+/// shows.
+ScaledImage scaled_about(const Image2d& image, const Eigen::Vector2d& fixed_px, double size) {
+  if (size == 1.0) return {image, {}};
   Image2d scaled(image.width, image.height);
+  std::vector<std::uint8_t> used(image.pixels.size(), 1);
+  const auto is_beyond = [](double fixed, double by, int at, int count) {
+    return std::abs(fixed + (at - fixed) / by - 0.5 * (count - 1.0)) > 0.5 * count;
+  };
   const auto along = [](double fixed, double by, int at, int count) {
     return std::clamp(fixed + (at - fixed) / by, 0.0, count - 1.0);
   };
@@ -119,9 +129,13 @@ Image2d scaled_about(const Image2d& image, const Eigen::Vector2d& fixed_px, doub
       };
       const float upper = between(above);
       scaled.at(column, row) = upper + down * (between(below) - upper);
+      if (is_beyond(fixed_px.x(), size, column, image.width) ||
+          is_beyond(fixed_px.y(), size, row, image.height))
+        used[static_cast<std::size_t>(row) * static_cast<std::size_t>(image.width) +
+             static_cast<std::size_t>(column)] = 0;
     }
   }
-  return scaled;
+  return {std::move(scaled), std::move(used)};
 }
 
 /// How far the CT reaches from the centre of rotations.
@@ -138,6 +152,12 @@ View own_detector(const View& view) {
   camera.detector_origin_point = camera.detector_point(view.roi.column, view.roi.row);
   camera.size_px = {view.roi.width, view.roi.height};
   return View::whole_detector(camera);
+}
+
+/// Whether DRRs show the whole CT, at any rotation, wherever that lies: without a field, which
+/// holds the rays of its detector only.
+bool shows_all_of_body(const RegistrationView& view, double silhouette_mm) {
+  return silhouette_mm > 0.0 && !view.reach.has_value();
 }
 
 /// The square of coarse pixels that shows everything this near to a point of the room.
@@ -163,7 +183,9 @@ std::vector<SearchedView::Place> places_of(const SeenTranslations& seen,
   std::vector<SearchedView::Place> places;
   for (std::size_t i = 0; i < seen.shifts.size(); ++i) {
     const Eigen::Vector2d at = seen.shifts[i] - seen.first.cast<double>();
-    const Eigen::Vector2i corner = at.array().floor().cast<int>();
+    // Rounding must not make the last shift, which has no neighbour, a corner.
+    const Eigen::Vector2i corner =
+        at.array().floor().cast<int>().min((seen.last - seen.first).array() - 1);
     places.push_back({depths.nearest(seen.depths[i]),
                       first.x() + corner.x(),
                       first.y() + corner.y(),
@@ -177,13 +199,15 @@ std::vector<SearchedView::Place> places_of(const SeenTranslations& seen,
 
 double pixel_mm_of(const RegistrationProblem& problem, int pixels_across, double silhouette_mm) {
   double pixel_mm = kLeastPixelMm;
-  if (silhouette_mm > 0.0)
-    return std::max(pixel_mm, 2.0 * radius_about_center_mm(problem) / pixels_across);
   for (const RegistrationView& view : problem.views) {
+    const CameraGeometry& camera = view.view.camera;
     const RegionOfInterest roi = view.widest_view().roi;
-    const double mm =
-        std::max(roi.width, roi.height) / view.view.camera.pixels_per_mm(problem.isocenter_point);
-    pixel_mm = std::max(pixel_mm, mm / pixels_across);
+    const double compared_px = shows_all_of_body(view, silhouette_mm)
+                                   ? 2.0 * radius_about_center_mm(problem) *
+                                         camera.pixels_per_mm(problem.frame().center_room_mm)
+                                   : std::max(roi.width, roi.height);
+    pixel_mm = std::max(
+        pixel_mm, compared_px / camera.pixels_per_mm(problem.isocenter_point) / pixels_across);
   }
   return pixel_mm;
 }
@@ -217,16 +241,20 @@ void SearchedView::compare(const Part& part,
   for (int i = 0; i < part.depths; ++i) {
     const std::span<float> here = likeness.subspan(static_cast<std::size_t>(i) * shifts, shifts);
     const double size = distance_mm / (distance_mm + depths.at(part.first_depth + i));
-    const Image2d seen = scaled_about(drr, center_px, size);
-    const EdgeImage edges(seen, {}, 0);
+    const ScaledImage seen = scaled_about(drr, center_px, size);
+    const EdgeImage edges(seen.image, seen.used, 0);
     if (silhouette_px == 0.0) {
       correlate(edges, xray, part.window, here);
       continue;
     }
     std::vector<Eigen::Vector2d> cuts(cuts_px.begin(), cuts_px.end());
     for (Eigen::Vector2d& cut : cuts) cut = center_px + size * (cut - center_px);
-    correlate_within(
-        silhouette(seen, silhouette_px, cuts), edges, xray, xray_squares, part.window, here);
+    const std::vector<std::uint8_t> body = silhouette(seen.image, silhouette_px, cuts);
+    if (static_cast<std::size_t>(std::ranges::count(body, std::uint8_t{1})) <
+        kLeastSilhouettePixels)
+      std::ranges::fill(here, 0.0f);
+    else
+      correlate_within(body, edges, xray, xray_squares, part.window, here);
   }
 }
 
@@ -283,7 +311,7 @@ SearchedView searched_view(const RegistrationProblem& problem,
   const CoarseRenderer coarse = coarse_renderer(view, pixel_step / pixels_per_mm);
   const StageGrid grid{pixel_step, 1.0, coarse.blur_sigma_mm * pixels_per_mm};
   const View whole = stage_view(View::whole_detector(camera), grid);
-  const View pattern = silhouette_mm > 0.0
+  const View pattern = shows_all_of_body(view, silhouette_mm)
                            ? square_about(whole.camera, at_middle, radius_about_center_mm(problem))
                            : stage_view(widest_view_at(problem, view, lattice.middle()), grid);
   SearchedView searched;

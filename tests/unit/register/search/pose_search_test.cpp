@@ -115,6 +115,9 @@ TEST(PoseSearch, FindsABodyAmongOthersWithinItsSilhouette) {
     options.orientations = orientations;
     const PoseSearch search(*small.problem, options, 4.0);
     EXPECT_LT(distance_mm(small, search.modes().front().room_from_ct), 8.0) << orientations;
+    const PoseSearch whole(*small.problem, options);
+    EXPECT_LT(whole.modes().front().likeness, search.modes().front().likeness - 0.1)
+        << "what lies around the body counts";
   }
 }
 
@@ -137,18 +140,23 @@ TEST(PoseSearch, IsTheSameOnEveryVectorWidthAndNumberOfThreads) {
       small_case_at(PoseParameters::from_deg_and_mm({9, 8, -14, -10, 12, 3}));
   PoseSearchOptions options;
   options.translation_mm = {20.0, 20.0, 20.0};
-  const std::vector<PoseMode> expected = PoseSearch(*small.problem, options).modes();
-  for (const VectorWidth width : supported_vector_widths()) {
-    force_vector_width(width);
-    const PoseSearch search(*small.problem, options, 0.0, std::make_shared<ThreadPool>(3));
-    const std::vector<PoseMode> modes = search.modes();
-    ASSERT_EQ(modes.size(), expected.size());
-    for (std::size_t i = 0; i < modes.size(); ++i) {
-      EXPECT_EQ(modes[i].room_from_ct.matrix(), expected[i].room_from_ct.matrix());
-      EXPECT_EQ(modes[i].likeness, expected[i].likeness);
+  for (const double silhouette_mm : {0.0, 4.0}) {
+    options.orientations = silhouette_mm > 0.0 ? "any" : "field";
+    const std::vector<PoseMode> expected =
+        PoseSearch(*small.problem, options, silhouette_mm).modes();
+    for (const VectorWidth width : supported_vector_widths()) {
+      force_vector_width(width);
+      const PoseSearch search(
+          *small.problem, options, silhouette_mm, std::make_shared<ThreadPool>(3));
+      const std::vector<PoseMode> modes = search.modes();
+      ASSERT_EQ(modes.size(), expected.size());
+      for (std::size_t i = 0; i < modes.size(); ++i) {
+        EXPECT_EQ(modes[i].room_from_ct.matrix(), expected[i].room_from_ct.matrix());
+        EXPECT_EQ(modes[i].likeness, expected[i].likeness);
+      }
     }
+    force_vector_width(std::nullopt);
   }
-  force_vector_width(std::nullopt);
 }
 
 TEST(PoseSearch, ModesAreApartAndInOrder) {
