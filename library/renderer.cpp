@@ -376,8 +376,8 @@ RayCaster::RayCaster(const Ct& ct,
         if (options.frame.has_value()) frame = library::checked_frame(*options.frame);
         const af::XrayBeamOptions beam_options = library::checked_beam(beam);
         const auto volume = ct.impl_->attenuation(model);
-        const auto through = [&](std::shared_ptr<const af::AttenuationVolume> of) {
-          return std::make_shared<const af::RayCastDrr>(std::move(of), caster, pool);
+        const auto through = [&](std::shared_ptr<const af::AttenuationVolume> attenuation) {
+          return std::make_shared<const af::RayCastDrr>(std::move(attenuation), caster, pool);
         };
         return std::make_shared<const Impl>(
             af::XrayBeam(beam_options, model)

@@ -340,7 +340,7 @@ struct PoseSearch::Parts {
   std::optional<Looking> first;  ///< with a first look at all rotations
   Looking looking;
   std::vector<Eigen::Matrix3d> rotations;  ///< of the first look, if there is one
-  bool is_in_silhouettes;
+  ModesKept kept;                          ///< likewise
 };
 
 void PoseSearchOptions::describe(Fields& field) {
@@ -438,7 +438,7 @@ PoseSearch::PoseSearch(const RegistrationProblem& problem,
                                     std::move(first),
                                     std::move(looking),
                                     searched_rotations(options, searched, step_rad),
-                                    silhouette_mm > 0.0});
+                                    silhouette_mm > 0.0 ? kKeptInSilhouettes : kKept});
 }
 
 PoseSearch::~PoseSearch() = default;
@@ -457,7 +457,7 @@ std::vector<PoseMode> PoseSearch::modes() const {
   const auto count = static_cast<std::size_t>(parts_->options.modes);
   ThreadPool& threads = *parts_->threads;
   const Looking& looking = parts_->looking;
-  const ModesKept& kept = parts_->is_in_silhouettes ? kKeptInSilhouettes : kKept;
+  const ModesKept& kept = parts_->kept;
   std::vector<PoseMode> modes;
   if (parts_->first.has_value()) {
     const Looking& first = *parts_->first;

@@ -10,6 +10,7 @@
 #include "register/method/prepared_stage.h"
 #include "register/problem/silhouette.h"
 #include "register/problem/target_region.h"
+#include "xray/bilinear.h"
 
 namespace af::registration {
 namespace {
@@ -101,41 +102,26 @@ struct ScaledImage {
   std::vector<std::uint8_t> used;
 };
 
-/// The image enlarged about a point of it, by linear interpolation. Beyond its border nothing
-/// shows.
+/// Where the pixels of an axis lie in the image before it is enlarged about a point.
+std::vector<double> positions_before(double fixed_px, double size, int count) {
+  std::vector<double> positions;
+  for (int i = 0; i < count; ++i) positions.push_back(fixed_px + (i - fixed_px) / size);
+  return positions;
+}
+
+/// The image enlarged about a point of it. Beyond its border nothing shows.
 ScaledImage scaled_about(const Image2d& image, const Eigen::Vector2d& fixed_px, double size) {
   if (size == 1.0) return {image, {}};
-  Image2d scaled(image.width, image.height);
-  std::vector<std::uint8_t> used(image.pixels.size(), 1);
-  const auto is_beyond = [](double fixed, double by, int at, int count) {
-    return std::abs(fixed + (at - fixed) / by - 0.5 * (count - 1.0)) > 0.5 * count;
+  const std::vector<double> columns = positions_before(fixed_px.x(), size, image.width);
+  const std::vector<double> rows = positions_before(fixed_px.y(), size, image.height);
+  const auto is_within = [](double position, int count) {
+    return position >= -0.5 && position <= count - 0.5;
   };
-  const auto along = [](double fixed, double by, int at, int count) {
-    return std::clamp(fixed + (at - fixed) / by, 0.0, count - 1.0);
-  };
-  for (int row = 0; row < image.height; ++row) {
-    const double y = along(fixed_px.y(), size, row, image.height);
-    const int above = std::min(static_cast<int>(y), std::max(0, image.height - 2));
-    const int below = std::min(above + 1, image.height - 1);
-    const auto down = static_cast<float>(y - above);
-    for (int column = 0; column < image.width; ++column) {
-      const double x = along(fixed_px.x(), size, column, image.width);
-      const int left = std::min(static_cast<int>(x), std::max(0, image.width - 2));
-      const int right = std::min(left + 1, image.width - 1);
-      const auto across = static_cast<float>(x - left);
-      const auto between = [&](int in_row) {
-        const float first = image.at(left, in_row);
-        return first + across * (image.at(right, in_row) - first);
-      };
-      const float upper = between(above);
-      scaled.at(column, row) = upper + down * (between(below) - upper);
-      if (is_beyond(fixed_px.x(), size, column, image.width) ||
-          is_beyond(fixed_px.y(), size, row, image.height))
-        used[static_cast<std::size_t>(row) * static_cast<std::size_t>(image.width) +
-             static_cast<std::size_t>(column)] = 0;
-    }
-  }
-  return {std::move(scaled), std::move(used)};
+  std::vector<std::uint8_t> used;
+  for (const double row : rows)
+    for (const double column : columns)
+      used.push_back(is_within(column, image.width) && is_within(row, image.height) ? 1 : 0);
+  return {resampled_bilinearly(image, columns, rows), std::move(used)};
 }
 
 /// How far the CT reaches from the centre of rotations.

@@ -9,7 +9,7 @@
 namespace af::registration {
 namespace {
 
-/// The lattice and each view's places of it take 28 bytes a translation.
+/// Each view's places of the lattice take 20 bytes a translation.
 constexpr double kMostTranslations = 4e6;
 
 }  // namespace

@@ -97,6 +97,20 @@ TEST(PoseSearch, FindsAPoseFarAlongABeamThroughASmallRegionAndAMask) {
   EXPECT_LT(distance_mm(small, search.modes().front().room_from_ct), 10.0);
 }
 
+TEST(PoseSearch, OneViewKnowsWhichWayAlongTheBeamByTheSizeOfWhatItShows) {
+  for (const double along_mm : {-150.0, 150.0}) {
+    test::SmallCase small =
+        small_case_at(PoseParameters::from_deg_and_mm({0, 0, 0, 4, along_mm, -3}));
+    small.problem->views.resize(1);
+    PoseSearchOptions options;
+    options.rotation_deg = {0.0, 0.0, 0.0};
+    options.translation_mm = {10.0, 200.0, 10.0};
+    const RigidTransform found = PoseSearch(*small.problem, options).modes().front().room_from_ct;
+    const double apart_mm = found.translation().y() - small.gold_room_from_ct.translation().y();
+    EXPECT_LT(std::abs(apart_mm), 75.0) << along_mm;
+  }
+}
+
 TEST(PoseSearch, FindsABodyAmongOthersWithinItsSilhouette) {
   // Beside the body lie two others, which its CT does not show.
   test::SmallCase small = small_case_at(PoseParameters::from_deg_and_mm({-8, 6, 11, 9, -7, 12}));
