@@ -12,15 +12,13 @@ int main(int argc, char** argv) {
   af::PrecomputeOptions options;
   CLI::App app{
       "Makes an attenuation field: all line integrals through a CT that one camera can see while "
-      "the CT moves within a range. It runs alone or under mpirun, with the same result; stopped, "
+      "the CT moves within a range. It runs alone, as --processes or under mpirun, with the same "
+      "result; stopped, "
       "the same command continues."};
   af::cli::bind_options(app, options);
   af::cli::bind_run_limits(app);
   const std::string command = af::cli::command_line(argc, argv);
-  return af::cli::app_main(
-      app,
-      argc,
-      argv,
-      [&](const af::Communicator& world) { af::run_precompute(options, command, world); },
-      [&] { return !options.is_dry_run; });
+  return af::cli::app_main(app, argc, argv, [&](const af::Communicator& world) {
+    af::run_precompute(options, command, world);
+  });
 }

@@ -27,8 +27,10 @@
 #include "cli/usage_message.h"
 #include "files/output_lock.h"
 #include "files/shell_words.h"
+#include "ranks/job_end.h"
 #include "ranks/launcher.h"
 #include "ranks/mpi_environment.h"
+#include "ranks/process_group.h"
 #include "ranks/stop_request.h"
 #include "ranks/work_watch.h"
 
@@ -116,7 +118,7 @@ std::string reason_text(const RankFailure& failure) {
 [[noreturn]] void end_after_report(int exit_code, bool has_reported) {
   constexpr std::chrono::seconds kPatience{5};
   if (!has_reported) std::this_thread::sleep_for(kPatience);
-  MpiEnvironment::abort(exit_code);
+  abort_job(exit_code);
 }
 
 /// Ends a process that would repeat the work of others.
@@ -127,16 +129,16 @@ void refuse_if_any(const CLI::App& app, const std::string& problem) {
   end_after_report(static_cast<int>(ExitCode::Usage), is_reporting);
 }
 
-/// Runs in the watchdog's thread.
-void end_job(const CLI::App& app, const std::string& stall) {
+/// Runs in a watching thread.
+void end_job(const CLI::App& app, const std::string& reason) {
   std::ostringstream text;
-  text << app.get_name() << ": " << stall
-       << " (--stall-minutes): the job is ended; run the same command again to go on\n";
+  text << app.get_name() << ": " << reason
+       << ": the job is ended; run the same command again to go on\n";
   std::cerr << text.str() << std::flush;
   // Open MPI 5 loses what its launcher has not read yet.
   constexpr std::chrono::milliseconds kUntilRead{200};
   std::this_thread::sleep_for(kUntilRead);
-  MpiEnvironment::abort(static_cast<int>(ExitCode::Stopped));
+  abort_job(static_cast<int>(ExitCode::Stopped));
 }
 
 /// Ends this process without MPI, which would itself wait for the other ranks. Whatever a program
@@ -166,18 +168,21 @@ class OnLeaving {
 int app_main(CLI::App& app,
              int argc,
              char** argv,
-             const std::function<void(const Communicator&)>& run,
-             const std::function<bool()>& needs_mpi) {
+             const std::function<void(const Communicator&)>& run) {
   // A write beyond a limit of file sizes must be an error to report, not a signal to die from. MPI
   // itself writes files.
   std::signal(SIGXFSZ, SIG_IGN);
   std::optional<WaitAlarm> alarm;  // outlives MPI
   std::optional<MpiEnvironment> environment;
-  const auto join_job = [&](bool writes_by_mpi) {
+  std::optional<ProcessGroup> processes;
+  const auto join_job = [&](int process_count) {
     refuse_if_any(app, lone_task_problem());
-    if (!writes_by_mpi && !is_launched()) return Communicator::alone();
-    environment.emplace(argc, argv);
+    if (is_launched() && process_count > 1)
+      refuse_if_any(app,
+                    "--processes shares the work of a program without a launcher: leave it out");
+    if (is_launched()) environment.emplace(argc, argv);
     refuse_if_any(app, split_job_problem(Communicator::world().size()));
+    processes.emplace(process_count, [&app](const std::string& loss) { end_job(app, loss); });
     return Communicator::world();
   };
   app.name(program_name(argv[0]));
@@ -189,14 +194,16 @@ int app_main(CLI::App& app,
     check_option_values(app);
   } catch (const CLI::ParseError& error) {
     if (asks_for_help(error)) return print_help(app, error);
-    return refuse_usage(app, error, join_job(false));
+    return refuse_usage(app, error, join_job(1));
   }
-  const Communicator world = join_job(needs_mpi && needs_mpi());
+  const Communicator world = join_job(local_processes().count);
   std::optional<StallWatch> watch;
   const double stall_minutes = run_limits().stall_minutes;
   if (stall_minutes > 0.0) {
     if (world.size() > 1) alarm.emplace(stall_minutes, [&app] { end_alone(app, "it begins"); });
-    watch.emplace(world, stall_minutes, [&app](const std::string& stall) { end_job(app, stall); });
+    watch.emplace(world, stall_minutes, [&app](const std::string& stall) {
+      end_job(app, stall + " (--stall-minutes)");
+    });
     alarm.reset();
   }
   const OnLeaving begin_to_end([&] {
@@ -206,7 +213,7 @@ int app_main(CLI::App& app,
   RankFailure failure;
   bool is_known_everywhere = false;
   try {
-    if (environment) require_threads(environment->thread_level());
+    if (environment) environment->require_threads();
     run(world);
     return with_output_written(app, static_cast<int>(ExitCode::Done));
   } catch (const RemoteError& error) {
@@ -220,7 +227,7 @@ int app_main(CLI::App& app,
   if (is_known_everywhere || world.size() == 1) {
     if (world.is_root())
       std::cerr << app.get_name() << ": " << failure.message << reason_text(failure) << std::endl;
-    if (!MpiEnvironment::is_abort_required()) return with_output_written(app, failure.exit_code);
+    if (!is_abort_required()) return with_output_written(app, failure.exit_code);
     end_after_report(failure.exit_code, world.is_root());
   }
   const bool is_reporting = claim_report();

@@ -11,9 +11,10 @@
 namespace af::cli {
 
 /// The skeleton of every program. It parses the command line (on every rank; only rank 0 prints
-/// help and usage errors), starts MPI where a launcher started the process (ranks/launcher.h), runs
-/// `run`, and turns every exception into one message and the exit code of ExitCode. When only one
-/// rank fails inside MPI, the whole job is ended.
+/// help and usage errors), starts MPI where a launcher started the process (ranks/launcher.h), or
+/// the processes that the user asks for (ranks/process_group.h), runs `run`, and turns every
+/// exception into one message and the exit code of ExitCode. When only one rank fails inside MPI,
+/// the whole job is ended.
 ///
 ///     int main(int argc, char** argv) {
 ///       Options options;
@@ -23,14 +24,11 @@ namespace af::cli {
 ///       run(options, world); });
 ///     }
 ///
-/// `run` returns normally for exit code 0. It gets Communicator::alone() where no launcher started
-/// the process, unless `needs_mpi` says that it writes by MPI. `needs_mpi` is asked once the
-/// options are set.
+/// `run` returns normally for exit code 0.
 int app_main(CLI::App& app,
              int argc,
              char** argv,
-             const std::function<void(const Communicator&)>& run,
-             const std::function<bool()>& needs_mpi = {});
+             const std::function<void(const Communicator&)>& run);
 
 /// The command line as typed, quoted for a shell. It goes into every output and reproduce.sh.
 std::string command_line(int argc, char** argv);

@@ -6,8 +6,8 @@
 
 namespace af::cli {
 
-/// Adds --max-hours and --stall-minutes to a program, or a sub-command, that can continue after a
-/// stop.
+/// Adds --max-hours, --stall-minutes and --processes to a program, or a sub-command, whose ranks
+/// share the work and which can continue after a stop.
 void bind_run_limits(CLI::App& app);
 
 /// Options of a program, or a sub-command, that keeps unfinished work in OUTPUT.progress.

@@ -17,7 +17,11 @@ set(CPACK_DEBIAN_PACKAGE_SECTION science)
 
 # mpirun is how the programs share work; af-convert and af-report are Python, as is a script of jobs/.
 set(CPACK_DEBIAN_PROGRAMS_PACKAGE_NAME attenuation-fields)
-set(CPACK_DEBIAN_PROGRAMS_PACKAGE_DEPENDS "openmpi-bin, python3, python3-h5py, python3-jinja2, python3-matplotlib, python3-numpy, python3-pydicom, python3-yaml")
+set(af_launcher_package "")
+if(AF_MPI)
+  set(af_launcher_package "openmpi-bin, ")
+endif()
+set(CPACK_DEBIAN_PROGRAMS_PACKAGE_DEPENDS "${af_launcher_package}python3, python3-h5py, python3-jinja2, python3-matplotlib, python3-numpy, python3-pydicom, python3-yaml")
 set(CPACK_DEBIAN_PROGRAMS_PACKAGE_SUGGESTS invesalius-examples)
 set(CPACK_COMPONENT_PROGRAMS_DESCRIPTION "The programs af-precompute, af-drr, af-simulate, af-register, af-evaluate,
 af-inspect and af-scan make compressed attenuation fields from CTs, look

@@ -6,13 +6,15 @@ find_package(Threads REQUIRED)
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)
 find_package(CLI11 REQUIRED)
 find_package(nlohmann_json REQUIRED)
-find_package(MPI REQUIRED COMPONENTS C)
+if(AF_MPI)
+  find_package(MPI REQUIRED COMPONENTS C)
+  # The C interface only: mpi.h would otherwise pull in the removed C++ bindings and their library.
+  set_property(TARGET MPI::MPI_C APPEND PROPERTY INTERFACE_COMPILE_DEFINITIONS OMPI_SKIP_MPICXX MPICH_SKIP_MPICXX)
+endif()
 if(AF_BUILD_TESTS AND NOT AF_BUILD_FUZZERS)
   find_package(GTest REQUIRED)
 endif()
 find_package(Boost 1.74 REQUIRED) # Boost.Math, headers only
-# The C interface only: mpi.h would otherwise pull in the removed C++ bindings and their library.
-set_property(TARGET MPI::MPI_C APPEND PROPERTY INTERFACE_COMPILE_DEFINITIONS OMPI_SKIP_MPICXX MPICH_SKIP_MPICXX)
 find_package(OpenSSL REQUIRED COMPONENTS Crypto)
 find_package(PkgConfig REQUIRED)
 find_package(ZLIB REQUIRED)
@@ -22,8 +24,12 @@ pkg_check_modules(tomlplusplus REQUIRED IMPORTED_TARGET tomlplusplus)
 pkg_check_modules(nlopt REQUIRED IMPORTED_TARGET nlopt)
 pkg_check_modules(cairo REQUIRED IMPORTED_TARGET cairo)
 
-# Parallel HDF5 strictly by its own pkg-config file, so that ITK's serial HDF5 can never take its place.
-pkg_check_modules(hdf5_openmpi REQUIRED IMPORTED_TARGET hdf5-openmpi)
+# HDF5 strictly by its own pkg-config file, so that ITK's serial HDF5 can never take the parallel one's place.
+if(AF_MPI)
+  pkg_check_modules(hdf5 REQUIRED IMPORTED_TARGET hdf5-openmpi)
+else()
+  pkg_check_modules(hdf5 REQUIRED IMPORTED_TARGET hdf5-serial)
+endif()
 
 # ITK's package file walks all its modules even when components are named; these three would fetch serial HDF5 and other
 # libraries into global variables. The names are ITK's own include guards (ITK internals, tried with 5.2 and 5.3).

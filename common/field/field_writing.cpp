@@ -13,11 +13,11 @@
 #include "field/hdf5_calls.h"
 #include "field/index_chunks.h"
 #include "field/index_dataset.h"
+#include "field/mpi_io.h"
 #include "files/input_guard.h"
 #include "files/output_file.h"
 #include "files/sha256.h"
-#include "ranks/mpi_environment.h"
-#include "ranks/mpi_handle.h"
+#include "ranks/job_end.h"
 #include "ranks/root_only.h"
 #include "ranks/work_watch.h"
 
@@ -136,41 +136,6 @@ void create_file_without_indices(const FileContents& contents, const std::filesy
   file.close("H5Fclose");
 }
 
-/// Hints as MPI wants them.
-class MpiInfo {
- public:
-  explicit MpiInfo(const MpiIoHints& hints) {
-    if (hints.empty()) return;
-    MPI_Info_create(&info_);
-    for (const auto& [key, value] : hints) MPI_Info_set(info_, key.c_str(), value.c_str());
-  }
-  ~MpiInfo() {
-    if (info_ != MPI_INFO_NULL) MPI_Info_free(&info_);
-  }
-  MpiInfo(const MpiInfo&) = delete;
-  MpiInfo& operator=(const MpiInfo&) = delete;
-
-  [[nodiscard]] MPI_Info handle() const { return info_; }
-
- private:
-  MPI_Info info_ = MPI_INFO_NULL;
-};
-
-/// For rank 0 alone. Hints on a file's layout (stripes) count only when it is created. If there are
-/// hints, MPI-IO therefore creates the file, and HDF5 writes into it.
-void lay_out(const std::filesystem::path& path, const MpiIoHints& hints) {
-  if (hints.empty()) return;
-  std::error_code ignored;
-  std::filesystem::remove(path, ignored);
-  const MpiInfo info(hints);
-  MPI_File file = MPI_FILE_NULL;
-  if (MPI_File_open(
-          MPI_COMM_SELF, path.c_str(), MPI_MODE_CREATE | MPI_MODE_WRONLY, info.handle(), &file) !=
-      MPI_SUCCESS)
-    throw FileError(path.string(), "cannot be made by MPI-IO");
-  MPI_File_close(&file);
-}
-
 /// The file that all ranks have open. After a failed write it can neither be written nor closed:
 /// some ranks know of the failure, and others wait for them within MPI-IO. A rank that fails
 /// therefore throws at once, the file stays open, and the job must end by abort.
@@ -183,18 +148,18 @@ class SharedFile {
              const MpiIoHints& hints)
       : path_(path), rules_(rules), communicator_(communicator) {
     all_or_none(communicator_, [&] {
+      if (!writes_by_mpi_ && !communicator_.is_root()) return;
       naming_file(path_, [&] {
         const Handle access = hdf5::file_access();
-        const MpiInfo info(hints);
         hdf5::hold_chunk_index(access, hdf5::chunk_count(rules_));
-        checked(H5Pset_fapl_mpio(access, communicator_.impl().handle, info.handle()),
-                "H5Pset_fapl_mpio");
+        if (writes_by_mpi_) hdf5::open_by_mpi(access, communicator_, hints);
         file_ = checked(H5Fopen(path_.c_str(), H5F_ACC_RDWR, access), "H5Fopen");
       });
     });
   }
 
   /// Collective. Writes the blocks of all ranks slab by slab, one block of every rank at a time.
+  /// Without MPI-IO rank 0 writes them all.
   void write(std::vector<IndexBlock>& blocks) {
     std::vector<std::uint64_t> most_blocks(rules_.size(), 0);
     for (const IndexBlock& block : blocks) ++most_blocks[block.slab];
@@ -204,17 +169,10 @@ class SharedFile {
       std::vector<IndexBlock*> of_slab;
       for (IndexBlock& block : blocks)
         if (block.slab == k) of_slab.push_back(&block);
-      naming_file(path_, [&] {
-        const hdf5::StoredTiles tiles(file_, rules_[k], path_.string());
-        for (std::size_t i = 0; i < most_blocks[k]; ++i) {
-          if (i >= of_slab.size()) {
-            tiles.write(nullptr, {});
-            continue;
-          }
-          const DatasetBlock block = in_dataset(*of_slab[i], rules_[k]);
-          tiles.write(&block, std::exchange(of_slab[i]->indices, {}));
-        }
-      });
+      if (writes_by_mpi_)
+        write_together(k, of_slab, most_blocks[k]);
+      else
+        write_on_root(k, of_slab, most_blocks[k]);
     }
   }
 
@@ -222,14 +180,58 @@ class SharedFile {
   /// fails, or what is read back differs.
   void close() {
     const WorkNote note("closing the file that all ranks wrote");
+    if (file_ == H5I_INVALID_HID) return;
     naming_file(path_,
                 [&] { checked(H5Fclose(std::exchange(file_, H5I_INVALID_HID)), "H5Fclose"); });
   }
 
  private:
+  void write_together(std::size_t slab, std::span<IndexBlock* const> mine, std::size_t most) {
+    naming_file(path_, [&] {
+      const hdf5::StoredTiles tiles(file_, rules_[slab], path_.string());
+      for (std::size_t i = 0; i < most; ++i) {
+        if (i >= mine.size()) {
+          tiles.write(nullptr, {}, hdf5::Writers::AllRanks);
+          continue;
+        }
+        const DatasetBlock block = in_dataset(*mine[i], rules_[slab]);
+        tiles.write(&block, std::exchange(mine[i]->indices, {}), hdf5::Writers::AllRanks);
+      }
+    });
+  }
+
+  void write_on_root(std::size_t slab, std::span<IndexBlock* const> mine, std::size_t most) {
+    for (std::size_t i = 0; i < most; ++i) {
+      std::vector<IndexBlock> next;
+      if (i < mine.size()) next.push_back(std::move(*mine[i]));
+      const std::vector<IndexBlock> of_all = at_root(std::move(next));
+      if (!communicator_.is_root()) continue;
+      naming_file(path_, [&] {
+        const hdf5::StoredTiles tiles(file_, rules_[slab], path_.string());
+        for (const IndexBlock& block : of_all) {
+          const DatasetBlock values = in_dataset(block, rules_[slab]);
+          tiles.write(&values, block.indices, hdf5::Writers::OneRank);
+        }
+      });
+    }
+  }
+
+  /// Collective. The blocks of all ranks on rank 0.
+  [[nodiscard]] std::vector<IndexBlock> at_root(std::vector<IndexBlock> mine) const {
+    if (communicator_.size() == 1) return mine;
+    const auto of_ranks = communicator_.all_gather(bytes_of(mine));
+    if (!communicator_.is_root()) return {};
+    std::vector<IndexBlock> all;
+    for (const std::vector<std::byte>& bytes : of_ranks)
+      for (auto& block : value_of<std::vector<IndexBlock>>(bytes, "index blocks of a rank"))
+        all.push_back(std::move(block));
+    return all;
+  }
+
   const std::filesystem::path& path_;
   const std::vector<DatasetRule>& rules_;
   const Communicator& communicator_;
+  bool writes_by_mpi_ = hdf5::writes_by_mpi(communicator_);
   hid_t file_ = H5I_INVALID_HID;
 };
 
@@ -378,7 +380,7 @@ FieldFileInfo write_file(const FileContents& contents,
   try {
     do_on_root(communicator, [&] {
       const WorkNote note("making " + partial.string());
-      lay_out(partial, hints);
+      if (hdf5::writes_by_mpi(communicator)) hdf5::lay_out_by_mpi(partial, hints);
       naming_file(partial, [&] { create_file_without_indices(contents, partial); });
     });
     const auto sums = write_indices(partial, contents.indices, next_blocks, communicator, hints);
@@ -396,7 +398,7 @@ FieldFileInfo write_file(const FileContents& contents,
     info.file_bytes = sealed->file_bytes;
   } catch (const Error& error) {
     // HDF5 would retry the failed write when MPI is finalised.
-    if (error.exit_code() != ExitCode::Stopped) MpiEnvironment::require_abort();
+    if (error.exit_code() != ExitCode::Stopped) require_abort();
     std::error_code ignored;
     if (communicator.is_root()) std::filesystem::remove(partial, ignored);
     throw;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes fields and atlases by parallel HDF5.
+// Writes fields and atlases: by parallel HDF5 where MPI runs, else from rank 0.
 #pragma once
 
 #include <array>
@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -24,6 +25,8 @@ struct IndexBlock {
   std::array<int, 4> first_tile = {0, 0, 0, 0};
   std::array<int, 4> tile_count = {0, 0, 0, 0};
   std::vector<std::uint16_t> indices;
+
+  auto members() { return std::tie(slab, first_tile, tile_count, indices); }
 };
 
 /// Tiles along s and t that one chunk of a file spans, where the slab has as many. Along u it spans
@@ -43,9 +46,10 @@ using NextBlocks = std::function<std::vector<IndexBlock>()>;
 using MakeProvenance = std::function<FieldProvenance()>;
 
 /// Hints to MPI-IO on how to write: names and values ("cb_nodes", "8"). It ignores unknown ones.
+/// Without MPI they say nothing.
 using MpiIoHints = std::vector<std::pair<std::string, std::string>>;
 
-/// Collective. Writes `field` with the blocks of all ranks by parallel HDF5 to "PATH.partial",
+/// Collective. Writes `field` with the blocks of all ranks to "PATH.partial",
 /// closes it, reads it back to verify it (ranks share its slabs), syncs and renames. The index
 /// arrays of the field's slabs are ignored; every rank gives its codebook.
 /// Blocks are asked for and written in rounds, one collective write per round and slab, so that no

@@ -14,10 +14,6 @@
 #include "field/dataset_rule.h"
 #include "field/hdf5_handles.h"
 
-#ifndef H5_HAVE_PARALLEL
-#error "the field file needs parallel HDF5: link hdf5-openmpi (see common/cmake/ThirdParty.cmake)"
-#endif
-
 namespace af::hdf5 {
 
 /// Runs `function`, and turns an HDF5 failure or a missing attribute into a FileError.

@@ -7,6 +7,7 @@
 #include "field/field_layout.h"
 #include "field/field_writing.h"
 #include "field/hdf5_calls.h"
+#include "field/mpi_io.h"
 #include "ranks/work_watch.h"
 
 namespace af::hdf5 {
@@ -98,11 +99,13 @@ void read(hid_t dataset, const DatasetBlock& block, std::span<std::uint16_t> val
           "H5Dread");
 }
 
-/// Collective.
-void write(hid_t dataset, const DatasetBlock* block, std::span<const std::uint16_t> values) {
+void write(hid_t dataset,
+           const DatasetBlock* block,
+           std::span<const std::uint16_t> values,
+           Writers writers) {
   const Selection selected(dataset, block);
   const Handle transfer(H5Pcreate(H5P_DATASET_XFER), H5Pclose, "H5Pcreate");
-  checked(H5Pset_dxpl_mpio(transfer, H5FD_MPIO_COLLECTIVE), "H5Pset_dxpl_mpio");
+  if (writers == Writers::AllRanks) write_collectively(transfer);
   const std::uint16_t nothing = 0;
   checked(H5Dwrite(dataset,
                    H5T_NATIVE_UINT16,
@@ -214,11 +217,13 @@ void StoredTiles::read_planes(
   }
 }
 
-void StoredTiles::write(const DatasetBlock* block, std::span<const std::uint16_t> values) const {
-  if (!means_) return hdf5::write(codewords_, block, values);
+void StoredTiles::write(const DatasetBlock* block,
+                        std::span<const std::uint16_t> values,
+                        Writers writers) const {
+  if (!means_) return hdf5::write(codewords_, block, values, writers);
   if (block == nullptr) {
-    hdf5::write(codewords_, nullptr, {});
-    return hdf5::write(*means_, nullptr, {});
+    hdf5::write(codewords_, nullptr, {}, writers);
+    return hdf5::write(*means_, nullptr, {}, writers);
   }
   check(block->first[3] % kMeanRunTiles == 0, "a block begins where differences of means do");
   std::vector<std::uint16_t> codewords;
@@ -233,9 +238,9 @@ void StoredTiles::write(const DatasetBlock* block, std::span<const std::uint16_t
     }
   });
   const DatasetBlock of_codewords = codewords_of(*block);
-  hdf5::write(codewords_, &of_codewords, codewords);
+  hdf5::write(codewords_, &of_codewords, codewords, writers);
   const DatasetBlock of_means = means_of(*block);
-  hdf5::write(*means_, &of_means, means);
+  hdf5::write(*means_, &of_means, means, writers);
 }
 
 }  // namespace af::hdf5

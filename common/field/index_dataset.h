@@ -38,6 +38,9 @@ void create_tiles(hid_t file, const field_layout::DatasetRule& rule, const Chunk
 std::string stated_sha256(hid_t file, const std::string& group);
 void state_sha256(hid_t file, const std::string& group, const std::string& sha256);
 
+/// Which ranks have a file open for writing.
+enum class Writers { OneRank, AllRanks };
+
 /// The datasets of one slab's tiles in an open file. Callers see them as index_rule() describes
 /// them: a row of codewords along t and, where tiles have means, the row of their means.
 class StoredTiles {
@@ -53,9 +56,12 @@ class StoredTiles {
       const std::function<void(std::uint64_t u, std::span<const std::uint16_t> planes)>& done)
       const;
 
-  /// Collective. Writes a block's values, or none where `block` is null. Where tiles have means,
-  /// the block begins along t at a multiple of kMeanRunTiles.
-  void write(const DatasetBlock* block, std::span<const std::uint16_t> values) const;
+  /// Collective, unless one rank alone has the file open. Writes a block's values, or none where
+  /// `block` is null. Where tiles have means, the block begins along t at a multiple of
+  /// kMeanRunTiles.
+  void write(const DatasetBlock* block,
+             std::span<const std::uint16_t> values,
+             Writers writers) const;
 
  private:
   field_layout::DatasetRule rule_;

@@ -8,12 +8,12 @@
 #include <system_error>
 
 #include <hdf5.h>
-#include <mpi.h>
 
 #include "base/error.h"
 #include "field/field_layout.h"
 #include "field/field_writing.h"
 #include "field/index_chunks.h"
+#include "ranks/mpi_environment.h"
 #include "ranks/work_watch.h"
 
 namespace af {
@@ -76,14 +76,10 @@ std::vector<IndexBlock> blocks_to_test(const std::array<int, 4>& tiles,
 std::string versions_text() {
   std::array<unsigned, 3> hdf5{};
   H5get_libversion(hdf5.data(), &hdf5[1], &hdf5[2]);
-  std::string mpi(MPI_MAX_LIBRARY_VERSION_STRING, '\0');
-  int length = 0;
-  MPI_Get_library_version(mpi.data(), &length);
-  mpi.resize(static_cast<std::size_t>(length));
-  mpi.resize(std::min(mpi.size(), mpi.find_first_of(",\n")));
   const char* const io = std::getenv("OMPI_MCA_io");
   return "HDF5 " + std::to_string(hdf5[0]) + "." + std::to_string(hdf5[1]) + "." +
-         std::to_string(hdf5[2]) + ", " + mpi + ", OMPI_MCA_io " + (io == nullptr ? "not set" : io);
+         std::to_string(hdf5[2]) + ", " + mpi_version() + ", OMPI_MCA_io " +
+         (io == nullptr ? "not set" : io);
 }
 
 /// Collective. Writes a field of these tiles as any field is written, verifies it and removes it.

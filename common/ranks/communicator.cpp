@@ -6,56 +6,20 @@
 #include <cstring>
 #include <filesystem>
 #include <new>
-#include <stdexcept>
 #include <sys/mman.h>
 
 #include "base/error.h"
 #include "base/host_name.h"
-#include "ranks/mpi_handle.h"
 #include "ranks/node_memory_file.h"
+#include "ranks/rank_group.h"
 #include "ranks/work_watch.h"
 
 namespace af {
 
 namespace {
 
-/// MPI counts are int, so longer messages go in pieces.
-constexpr std::size_t kLargestPiece = std::size_t{1} << 30;
-
-/// Whether this is Communicator::alone(): there is nobody to talk to, and MPI may not be
-/// initialised.
-bool is_alone(MPI_Comm communicator) {
-  return communicator == MPI_COMM_NULL;
-}
-
-void require_success(int code, const char* call) {
-  if (code == MPI_SUCCESS) return;
-  throw std::runtime_error(std::string(call) + " failed with MPI error " + std::to_string(code));
-}
-
-void reduce_in_place(MPI_Comm communicator, std::span<std::uint64_t> values, MPI_Op operation) {
-  constexpr std::size_t kPiece = kLargestPiece / sizeof(std::uint64_t);
-  for (std::size_t first = 0; first < values.size(); first += kPiece) {
-    const std::size_t count = std::min(kPiece, values.size() - first);
-    void* buffer = values.data() + first;
-    require_success(
-        MPI_Allreduce(
-            MPI_IN_PLACE, buffer, static_cast<int>(count), MPI_UINT64_T, operation, communicator),
-        "MPI_Allreduce");
-  }
-}
-
-void broadcast_bytes(MPI_Comm communicator, std::span<std::byte> bytes) {
-  for (std::size_t first = 0; first < bytes.size(); first += kLargestPiece) {
-    const std::size_t count = std::min(kLargestPiece, bytes.size() - first);
-    require_success(
-        MPI_Bcast(bytes.data() + first, static_cast<int>(count), MPI_BYTE, 0, communicator),
-        "MPI_Bcast");
-  }
-}
-
-std::uint64_t broadcast_size(MPI_Comm communicator, std::uint64_t size) {
-  require_success(MPI_Bcast(&size, 1, MPI_UINT64_T, 0, communicator), "MPI_Bcast");
+std::uint64_t size_at_root(RankGroup& ranks, std::uint64_t size) {
+  ranks.broadcast(std::as_writable_bytes(std::span(&size, 1)));
   return size;
 }
 
@@ -131,115 +95,73 @@ std::shared_ptr<std::byte> memory_of_node(const Communicator& world,
 
 }  // namespace
 
+std::shared_ptr<RankGroup>& ranks_of_job() {
+  static std::shared_ptr<RankGroup> ranks;
+  return ranks;
+}
+
 Communicator Communicator::world() {
-  static const auto world = std::make_shared<Impl>(Impl{MPI_COMM_WORLD});
-  return Communicator(world);
+  return Communicator(ranks_of_job());
 }
 
 Communicator Communicator::alone() {
-  return Communicator(std::make_shared<Impl>());
+  return Communicator(nullptr);
 }
 
-int Communicator::rank() const {
-  int rank = 0;
-  if (is_alone(impl_->handle)) return rank;
-  MPI_Comm_rank(impl_->handle, &rank);
-  return rank;
-}
-
-int Communicator::size() const {
-  int size = 1;
-  if (is_alone(impl_->handle)) return size;
-  MPI_Comm_size(impl_->handle, &size);
-  return size;
+Communicator::Communicator(std::shared_ptr<RankGroup> group) : group_(std::move(group)) {
+  if (group_ == nullptr) return;
+  rank_ = group_->rank();
+  size_ = group_->size();
 }
 
 void Communicator::barrier() const {
-  if (is_alone(impl_->handle)) return;
+  if (size_ == 1) return;
   const WaitNote waits;
-  require_success(MPI_Barrier(impl_->handle), "MPI_Barrier");
+  group_->barrier();
 }
 
 void Communicator::sum(std::span<std::uint64_t> values) const {
-  if (is_alone(impl_->handle)) return;
+  if (size_ == 1) return;
   const WaitNote waits;
-  reduce_in_place(impl_->handle, values, MPI_SUM);
+  group_->reduce(values, RankGroup::Reduction::Sum);
 }
 
 void Communicator::maximum(std::span<std::uint64_t> values) const {
-  if (is_alone(impl_->handle)) return;
+  if (size_ == 1) return;
   const WaitNote waits;
-  reduce_in_place(impl_->handle, values, MPI_MAX);
+  group_->reduce(values, RankGroup::Reduction::Maximum);
 }
 
 void Communicator::broadcast(std::vector<std::byte>& bytes) const {
-  if (is_alone(impl_->handle)) return;
+  if (size_ == 1) return;
   const WaitNote waits;
-  bytes.resize(broadcast_size(impl_->handle, bytes.size()));
-  broadcast_bytes(impl_->handle, bytes);
+  bytes.resize(size_at_root(*group_, bytes.size()));
+  group_->broadcast(bytes);
 }
 
 void Communicator::broadcast(std::string& text) const {
-  if (is_alone(impl_->handle)) return;
+  if (size_ == 1) return;
   const WaitNote waits;
-  text.resize(broadcast_size(impl_->handle, text.size()));
-  broadcast_bytes(impl_->handle, std::as_writable_bytes(std::span(text)));
+  text.resize(size_at_root(*group_, text.size()));
+  group_->broadcast(std::as_writable_bytes(std::span(text)));
 }
 
 std::vector<std::vector<std::byte>> Communicator::all_gather(
     std::span<const std::byte> mine) const {
-  if (is_alone(impl_->handle)) return {{mine.begin(), mine.end()}};
+  if (size_ == 1) return {{mine.begin(), mine.end()}};
   const WaitNote waits;
-  const auto ranks = static_cast<std::size_t>(size());
-  const std::uint64_t my_bytes = mine.size();
-  std::vector<std::uint64_t> bytes(ranks);
-  // The check compares names of types, and data() has lost the name of uint64_t.
-  require_success(  // NOLINTNEXTLINE(mpi-type-mismatch)
-      MPI_Allgather(&my_bytes, 1, MPI_UINT64_T, bytes.data(), 1, MPI_UINT64_T, impl_->handle),
-      "MPI_Allgather");
-  std::vector<std::vector<std::byte>> parts(ranks);
-  const std::size_t piece = kLargestPiece / ranks;
-  for (std::size_t first = 0; first < *std::ranges::max_element(bytes); first += piece) {
-    std::vector<int> counts, offsets;
-    int total = 0;
-    for (const std::uint64_t of_rank : bytes) {
-      offsets.push_back(total);
-      counts.push_back(static_cast<int>(std::min(piece, of_rank - std::min(of_rank, first))));
-      total += counts.back();
-    }
-    std::vector<std::byte> all(static_cast<std::size_t>(total));
-    require_success(MPI_Allgatherv(mine.data() + std::min(mine.size(), first),
-                                   counts[static_cast<std::size_t>(rank())],
-                                   MPI_BYTE,
-                                   all.data(),
-                                   counts.data(),
-                                   offsets.data(),
-                                   MPI_BYTE,
-                                   impl_->handle),
-                    "MPI_Allgatherv");
-    for (std::size_t i = 0; i < ranks; ++i)
-      parts[i].insert(
-          parts[i].end(), all.begin() + offsets[i], all.begin() + offsets[i] + counts[i]);
-  }
-  return parts;
+  return group_->all_gather(mine);
 }
 
 Communicator Communicator::node() const {
-  if (is_alone(impl_->handle)) return *this;
-  if (impl_->node == nullptr) {
-    const WaitNote waits;
-    auto node = std::make_shared<Impl>();
-    require_success(MPI_Comm_split_type(
-                        impl_->handle, MPI_COMM_TYPE_SHARED, rank(), MPI_INFO_NULL, &node->handle),
-                    "MPI_Comm_split_type");
-    impl_->node = std::move(node);
-  }
-  return Communicator(impl_->node);
+  if (size_ == 1) return *this;
+  const WaitNote waits;
+  std::shared_ptr<RankGroup> node = group_->node();
+  return node == nullptr ? *this : Communicator(std::move(node));
 }
 
 std::shared_ptr<std::byte> Communicator::allocate_on_node(std::size_t bytes) const {
-  if (is_alone(impl_->handle)) return memory_of_process(bytes);
-  return memory_of_node(*this, node(), bytes);
+  return size_ == 1 ? memory_of_process(bytes) : memory_of_node(*this, node(), bytes);
 }
 
 std::shared_ptr<const std::byte> Communicator::allocate_on_node(
@@ -253,7 +175,7 @@ std::shared_ptr<const std::byte> Communicator::allocate_on_node_together(
     std::size_t bytes,
     const std::function<void(std::span<std::byte>, int part, int parts)>& fill) const {
   const std::shared_ptr<std::byte> memory = allocate_on_node(bytes);
-  if (is_alone(impl_->handle)) {
+  if (size_ == 1) {
     fill(std::span<std::byte>(memory.get(), bytes), 0, 1);
     return memory;
   }
@@ -278,7 +200,7 @@ std::shared_ptr<const std::byte> Communicator::allocate_on_nodes_from_root(
 std::shared_ptr<const std::byte> Communicator::allocate_on_nodes_from_root_together(
     std::size_t bytes,
     const std::function<void(std::span<std::byte>, int part, int parts)>& fill) const {
-  if (is_alone(impl_->handle)) return allocate_on_node_together(bytes, fill);
+  if (size_ == 1) return allocate_on_node_together(bytes, fill);
   const Communicator on_node = node();
   std::array<std::uint64_t, 1> is_roots_node{is_root() ? std::uint64_t{1} : std::uint64_t{0}};
   on_node.maximum(is_roots_node);
@@ -287,15 +209,9 @@ std::shared_ptr<const std::byte> Communicator::allocate_on_nodes_from_root_toget
   all_or_none(*this, [&] {
     if (is_roots_node[0] != 0) fill(memory, on_node.rank(), on_node.size());
   });
-  const bool is_first_of_node = on_node.is_root();
-  MPI_Comm first_ranks = MPI_COMM_NULL;
-  require_success(
-      MPI_Comm_split(impl_->handle, is_first_of_node ? 0 : MPI_UNDEFINED, rank(), &first_ranks),
-      "MPI_Comm_split");
-  if (is_first_of_node) {
+  {
     const WaitNote waits;
-    broadcast_bytes(first_ranks, memory);
-    MPI_Comm_free(&first_ranks);  // all of its ranks are here
+    group_->broadcast_to_nodes(memory);
   }
   barrier();
   return owner;

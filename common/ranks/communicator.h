@@ -16,17 +16,19 @@
 
 namespace af {
 
-/// A group of MPI ranks; without mpirun, a group of one. MPI stays behind this header.
+class RankGroup;
+
+/// The ranks that share a job's work: those of MPI (MpiEnvironment), or the processes of one
+/// machine (ProcessGroup), or one. How they speak to each other stays behind this header.
 class Communicator {
  public:
-  /// All ranks of the job. Requires a live MpiEnvironment.
+  /// All ranks of the job: this process alone where neither of the two lives.
   static Communicator world();
-  /// The calling process alone, without MPI. It serves libraries, and programs that no launcher
-  /// started. It cannot write fields, which takes MPI-IO. \test CommunicatorAlone.NeedsNoMpi
+  /// The calling process alone, whatever the job. \test CommunicatorAlone.NeedsNoMpi
   static Communicator alone();
 
-  [[nodiscard]] int rank() const;
-  [[nodiscard]] int size() const;
+  [[nodiscard]] int rank() const { return rank_; }
+  [[nodiscard]] int size() const { return size_; }
   [[nodiscard]] bool is_root() const { return rank() == 0; }
 
   /// Collective.
@@ -45,7 +47,8 @@ class Communicator {
   /// A cache line.
   static constexpr std::size_t kNodeMemoryAlignment = 64;
 
-  /// Collective. The ranks that share this rank's memory, a group that lasts as long as MPI does.
+  /// Collective. The ranks that share this rank's memory, a group that lasts as long as the job's
+  /// does.
   [[nodiscard]] Communicator node() const;
 
   /// Collective. Memory of `bytes` zeros held once per node, aligned to kNodeMemoryAlignment.
@@ -73,12 +76,15 @@ class Communicator {
       std::size_t bytes,
       const std::function<void(std::span<std::byte>, int part, int parts)>& fill) const;
 
-  struct Impl;
-  [[nodiscard]] const Impl& impl() const { return *impl_; }
+  /// Null for Communicator::alone().
+  [[nodiscard]] RankGroup* group() const { return group_.get(); }
 
  private:
-  explicit Communicator(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
-  std::shared_ptr<Impl> impl_;
+  explicit Communicator(std::shared_ptr<RankGroup> group);
+
+  std::shared_ptr<RankGroup> group_;
+  int rank_ = 0;
+  int size_ = 1;
 };
 
 /// What went wrong on some rank, for all_or_none().

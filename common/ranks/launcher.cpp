@@ -5,6 +5,8 @@
 #include <array>
 #include <cstdlib>
 
+#include "ranks/mpi_environment.h"
+
 namespace af {
 
 namespace {
@@ -42,10 +44,6 @@ bool is_first_process() {
   return true;
 }
 
-bool is_only_task() {
-  return tasks_without_pmi() == "1";
-}
-
 std::string lone_task_problem() {
   const std::string tasks = tasks_without_pmi();
   if (tasks.empty() || tasks == "1") return {};
@@ -57,14 +55,16 @@ std::string lone_task_problem() {
 }
 
 std::string split_job_problem(int joined) {
-  for (const char* name : {"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MV2_COMM_WORLD_SIZE"}) {
+  for (const char* name :
+       {"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MV2_COMM_WORLD_SIZE", "SLURM_STEP_NUM_TASKS"}) {
     const std::string processes = variable(name);
     if (processes.empty()) continue;
     if (joined > 1 || processes == "1") return {};
-    return "a launcher of another MPI started this process as one of several (" +
-           std::string(name) + "=" + processes +
+    return "a launcher started this process as one of several (" + std::string(name) + "=" +
+           processes +
            "), which do not find each other; each would do the whole job: use the mpirun of the "
-           "Open MPI that the programs are linked with";
+           "MPI that the programs are linked with (" +
+           mpi_version() + "), or --processes on one machine";
   }
   return {};
 }

@@ -13,9 +13,6 @@ namespace af {
 /// Whether this process speaks for the job. For programs that end before MPI begins.
 [[nodiscard]] bool is_first_process();
 
-/// Whether srun started this process, without PMI, as its only task.
-[[nodiscard]] bool is_only_task();
-
 /// Why this process may not run alone, and what to do. The reason is that srun started it, without
 /// PMI, as one of several tasks, each of which would take itself for the whole job and write the
 /// same files. Empty when it may. \test Launcher.RefusesOneOfSeveralTasksWithoutPmi

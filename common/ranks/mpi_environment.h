@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <string>
+
 namespace af {
 
-/// Lifetime of MPI in a program: the constructor initialises it, the destructor finalises it. One
-/// per process. Works with and without mpirun, and in a shell that srun started as its only task.
+/// Lifetime of MPI in a program that a launcher started: the constructor initialises it and makes
+/// the ranks of Communicator::world(), the destructor finalises it. One per process. In a build
+/// without MPI (AF_MPI=OFF) it does nothing, and the world is this process alone.
 class MpiEnvironment {
  public:
   MpiEnvironment(int& argc, char**& argv);
@@ -12,28 +15,19 @@ class MpiEnvironment {
   MpiEnvironment(const MpiEnvironment&) = delete;
   MpiEnvironment& operator=(const MpiEnvironment&) = delete;
 
-  /// What MPI says it supports: MPI_THREAD_SINGLE or more.
-  [[nodiscard]] int thread_level() const { return thread_level_; }
-
-  /// Ends every rank of the job at once with `exit_code`. Ends this process where MPI is not
-  /// initialised.
-  [[noreturn]] static void abort(int exit_code);
-
-  /// From now on this rank can only end by abort(): a library is in a state in which finalising MPI
-  /// would hang or crash.
-  static void require_abort();
-  [[nodiscard]] static bool is_abort_required();
+  /// Collective. Throws RemoteError when MPI does not support processes with threads, since every
+  /// rank is told the same. Ours have threads, of which only the first calls MPI.
+  void require_threads() const;
 
  private:
-  void init(int& argc, char**& argv);
-  void init_alone(int& argc, char**& argv);
-
   int thread_level_ = 0;
 };
 
-/// Throws RemoteError when MPI's level is below MPI_THREAD_FUNNELED, since every rank is told the
-/// same. Our processes have threads, of which only the first calls MPI.
+/// Throws as MpiEnvironment::require_threads() at a level below MPI_THREAD_FUNNELED.
 /// \test MpiEnvironment.WithoutSupportOfThreadsIsAnError
 void require_threads(int thread_level);
+
+/// Name and version of the MPI that the program is linked with, e.g. "Open MPI v4.1.4"; "no MPI".
+std::string mpi_version();
 
 }  // namespace af

@@ -8,6 +8,8 @@
 #include <cstdlib>
 #include <sstream>
 
+#include "ranks/process_group.h"
+
 namespace af {
 namespace {
 
@@ -22,7 +24,7 @@ const Clock::time_point program_start = Clock::now();
 RunLimits limits;
 
 extern "C" void remember_signal(int signal) {
-  stop_signal = signal;
+  if (stop_signal.exchange(signal) == 0) pass_on_signal(signal);
 }
 
 double hours_since_start() {

@@ -2,7 +2,6 @@
 #include "ranks/work_queue.h"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <chrono>
 #include <mutex>
@@ -10,15 +9,12 @@
 #include <string>
 #include <thread>
 
-#include "ranks/mpi_handle.h"
+#include "ranks/rank_group.h"
 #include "ranks/work_watch.h"
 
 namespace af {
 
 namespace {
-
-constexpr int kRequestTag = 11;
-constexpr int kGrantTag = 12;
 
 /// What every rank needs to do items.
 struct Job {
@@ -32,10 +28,8 @@ struct Job {
   }
 };
 
-struct Block {
-  std::int64_t first = 0;
-  std::int64_t count = 0;  ///< 0: no more work
-};
+using Block = RankGroup::Grant;
+using Request = RankGroup::Request;
 
 /// State of the hand-out on rank 0, shared by its computing thread and its answering thread.
 class Ledger {
@@ -80,30 +74,15 @@ class Ledger {
   std::int64_t done_ = 0;
 };
 
-/// The message by which a worker asks for work. It says how many items it has finished since the
-/// last one, and whether one failed.
-struct Request {
-  std::int64_t finished = 0;
-  std::int64_t has_failed = 0;
-};
-
 /// Answers one request when there is one. `active_workers` falls when a worker gets no more work.
-/// This uses messages instead of one-sided windows, which fail across hosts over TCP, or stall
-/// while the target computes.
-bool answer_request(MPI_Comm handle, Ledger& ledger, int& active_workers) {
-  int arrived = 0;
-  MPI_Status status;
-  MPI_Iprobe(MPI_ANY_SOURCE, kRequestTag, handle, &arrived, &status);
-  if (arrived == 0) return false;
-  Request request;
-  MPI_Recv(&request, 2, MPI_INT64_T, status.MPI_SOURCE, kRequestTag, handle, MPI_STATUS_IGNORE);
-  ledger.add_done(request.finished);
-  if (request.has_failed != 0) ledger.stop();
-  const Block block = ledger.take_fair_share();
-  const std::array<std::int64_t, 2> grant{block.first, block.count};
-  MPI_Send(grant.data(), 2, MPI_INT64_T, status.MPI_SOURCE, kGrantTag, handle);
-  if (block.count == 0) --active_workers;
-  return true;
+bool answer_request(RankGroup& ranks, Ledger& ledger, int& active_workers) {
+  return ranks.answer_request([&](const Request& request) {
+    ledger.add_done(request.finished);
+    if (request.has_failed != 0) ledger.stop();
+    const Block block = ledger.take_fair_share();
+    if (block.count == 0) --active_workers;
+    return block;
+  });
 }
 
 /// Rank 0's own share of the work, item by item.
@@ -147,7 +126,7 @@ RankFailure run_as_manager(const Communicator& communicator, const Job& job) {
   std::optional<WaitNote> waits;
   while (is_computing || active_workers > 0) {
     if (!is_computing && !waits) waits.emplace();
-    if (active_workers > 0 && answer_request(communicator.impl().handle, ledger, active_workers))
+    if (active_workers > 0 && answer_request(*communicator.group(), ledger, active_workers))
       continue;
     report_progress();
     std::this_thread::sleep_for(std::chrono::microseconds(50));
@@ -157,25 +136,21 @@ RankFailure run_as_manager(const Communicator& communicator, const Job& job) {
   return failure_of_work.exit_code != 0 ? failure_of_work : failure_of_report;
 }
 
-std::array<std::int64_t, 2> next_grant(MPI_Comm handle) {
+Block next_block(RankGroup& ranks, const Request& request) {
   const WaitNote waits;
-  std::array<std::int64_t, 2> grant{};
-  MPI_Recv(grant.data(), 2, MPI_INT64_T, 0, kGrantTag, handle, MPI_STATUS_IGNORE);
-  return grant;
+  return ranks.ask(request);
 }
 
 RankFailure run_as_worker(const Communicator& communicator, const Job& job) {
-  const MPI_Comm handle = communicator.impl().handle;
   RankFailure failure;
   Request request;
   while (true) {
-    MPI_Send(&request, 2, MPI_INT64_T, 0, kRequestTag, handle);
-    const std::array<std::int64_t, 2> grant = next_grant(handle);
-    if (grant[1] == 0) return failure;
+    const Block block = next_block(*communicator.group(), request);
+    if (block.count == 0) return failure;
     request.finished = 0;
     try {
-      for (; request.finished < grant[1]; ++request.finished)
-        job.do_item(grant[0] + request.finished);
+      for (; request.finished < block.count; ++request.finished)
+        job.do_item(block.first + request.finished);
     } catch (...) {
       failure = failure_of(std::current_exception());
       request.has_failed = 1;

@@ -16,13 +16,13 @@ af_add_test(
 af_add_mpi_test(
   field_file_test
   SOURCES mpi/field_file_test.cpp
-  LIBS af_field af_study af_ranks MPI::MPI_C PkgConfig::hdf5_openmpi
+  LIBS af_field af_study af_ranks PkgConfig::hdf5
   RANKS 1 2 3 4)
 
 af_add_mpi_test(
   atlas_file_test
   SOURCES mpi/atlas_file_test.cpp
-  LIBS af_drr MPI::MPI_C PkgConfig::hdf5_openmpi
+  LIBS af_drr PkgConfig::hdf5
   RANKS 1 2 3 4)
 
 af_add_mpi_test(field_build_test SOURCES mpi/field_build_test.cpp LIBS af_precompute_build RANKS 1 2 3 4)

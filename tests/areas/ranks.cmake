@@ -12,3 +12,6 @@ af_add_mpi_test(shared_inputs_test SOURCES mpi/shared_inputs_test.cpp LIBS af_st
 
 af_add_test(run_test SOURCES unit/ranks/alone_test.cpp unit/ranks/progress_journal_test.cpp unit/ranks/provenance_test.cpp
             LIBS af_ranks)
+if(AF_MPI)
+  target_sources(run_test PRIVATE unit/ranks/mpi_environment_test.cpp)
+endif()

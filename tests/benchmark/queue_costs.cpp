@@ -10,7 +10,7 @@
 #include "base/stored_bytes.h"
 #include "benchmark/alternating_rounds.h"
 #include "evaluate/registration/registration_rows.h"
-#include "ranks/mpi_handle.h"
+#include "ranks/mpi_group.h"
 #include "ranks/progress_journal.h"
 #include "ranks/stop_request.h"
 #include "support/test_paths.h"
@@ -66,7 +66,7 @@ void ask(MPI_Comm handle, const std::vector<std::byte>& request) {
 
 /// Median over requests of `bytes` bytes; on rank 0.
 double median_answer_seconds(const Communicator& world, std::size_t bytes, int repetitions) {
-  const MPI_Comm handle = world.impl().handle;
+  const MPI_Comm handle = mpi_handle(world);
   std::vector<std::byte> buffer(bytes);
   std::vector<double> seconds;
   for (int i = 0; i < repetitions; ++i) {

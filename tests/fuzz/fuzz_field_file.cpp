@@ -16,7 +16,6 @@
 #include "files/sha256.h"
 #include "fuzz/fuzz_input.h"
 #include "fuzz/sample_field.h"
-#include "ranks/mpi_environment.h"
 
 namespace {
 
@@ -30,14 +29,6 @@ const std::string kElsewhere = "elsewhere.h5";
 std::string bytes_of_file(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
   return std::string(std::istreambuf_iterator<char>(file), {});
-}
-
-void start_mpi() {
-  static int argc = 1;
-  static std::array<char, 5> name = {'f', 'u', 'z', 'z', '\0'};
-  static std::array<char*, 2> arguments = {name.data(), nullptr};
-  static char** argv = arguments.data();
-  static const MpiEnvironment mpi(argc, argv);
 }
 
 /// A sound file, and what it holds.
@@ -76,7 +67,7 @@ SoundFile sound_field(const CompressedAttenuationField& field) {
               fuzz::sample_blocks(field.lattice(), has_means),
               {"0.1.0", "af-precompute", kOptions, "{}"},
               fuzz::scratch_folder() / kElsewhere,
-              Communicator::world());
+              Communicator::alone());
   std::vector<Dataset> beside = field_layout::range_datasets(field.identity.range);
   for (Dataset& dataset : field_layout::material_datasets(field.identity.material))
     beside.push_back(std::move(dataset));
@@ -99,7 +90,7 @@ SoundFile sound_atlas(const AttenuationAtlas& atlas) {
         return FieldProvenance{"0.1.0", "af-precompute", kOptions, "{}"};
       },
       fuzz::scratch_folder() / kElsewhere,
-      Communicator::world());
+      Communicator::alone());
   SoundFile sound;
   sound.is_atlas = true;
   sound.codebook = atlas.codebook;
@@ -114,7 +105,6 @@ SoundFile sound_atlas(const AttenuationAtlas& atlas) {
 
 /// Sound files that together have everything that a file may have.
 std::vector<SoundFile> sound_files() {
-  start_mpi();
   const CompressedAttenuationField plain = fuzz::sample_field();
   const CompressedAttenuationField mean_removed = fuzz::sample_field_with_means();
   CompressedAttenuationField filtered = mean_removed;
@@ -320,7 +310,7 @@ void try_edit(Edit&& edit) {
 
 /// What a program would do with the file.
 void read_all(const std::filesystem::path& path) {
-  const Communicator world = Communicator::world();
+  const Communicator world = Communicator::alone();
   if (!is_atlas_file(path)) {
     const auto field = read_field_of_any_material(path, world);
     fuzz::require(problems(*field).empty(), "an accepted field is sound");

@@ -13,7 +13,6 @@
 #include "precompute/build/field_encoder.h"
 #include "precompute/build/training_journal.h"
 #include "precompute/build/unit_store.h"
-#include "ranks/mpi_environment.h"
 
 namespace {
 
@@ -23,15 +22,6 @@ namespace fs = std::filesystem;
 constexpr std::uint32_t kCodebookCrc = 7;
 constexpr std::int64_t kRaysPerUnit = 1000;
 const std::string kFirstShard = "units.0000-000000.records";
-
-Communicator world() {
-  static int argc = 1;
-  static std::array<char, 5> name = {'f', 'u', 'z', 'z', '\0'};
-  static std::array<char*, 2> arguments = {name.data(), nullptr};
-  static char** argv = arguments.data();
-  static const MpiEnvironment mpi(argc, argv);
-  return Communicator::world();
-}
 
 fs::path folder() {
   return fuzz::scratch_folder() / "progress";
@@ -55,7 +45,8 @@ const std::vector<WorkUnit>& units() {
 }
 
 UnitStore opened() {
-  return {{folder(), "units", {{"step_mm", "3"}, {"ct", "b"}}, kRaysPerUnit}, world()};
+  return {{folder(), "units", {{"step_mm", "3"}, {"ct", "b"}}, kRaysPerUnit},
+          Communicator::alone()};
 }
 
 std::map<std::uint32_t, UnitTiles> found_in(UnitStore& progress) {
@@ -197,9 +188,9 @@ void go_on_training(fuzz::InputBytes& input) {
   if (input.take_below(4) == 0) bytes[input.take_below(bytes.size())] ^= input.take<std::byte>();
   const UnfinishedWork work = {folder(), "training", {{"codewords", std::to_string(kCodewords)}}};
   const CodebookOptions options = {kCodewords, 3};
-  { const TrainingJournal journal(work, options, world()); }
+  { const TrainingJournal journal(work, options, Communicator::alone()); }
   ProgressShard({work.folder, work.name}, {}).append(1, {bytes});
-  const TrainingJournal journal(work, options, world());
+  const TrainingJournal journal(work, options, Communicator::alone());
   TrainingShare share;
   for (std::uint16_t i = 1; i < 12; ++i) {
     NumberedTile tile{i, {}};
@@ -216,7 +207,7 @@ void go_on_training(fuzz::InputBytes& input) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   fuzz::InputBytes input(data, size);
-  (void)world();
+  (void)Communicator::alone();
   fs::remove_all(folder());
   switch (input.take_below(5)) {
     case 0:

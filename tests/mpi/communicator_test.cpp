@@ -7,7 +7,6 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
-#include "ranks/mpi_environment.h"
 
 namespace af {
 namespace {
@@ -36,6 +35,33 @@ TEST(Communicator, GathersPartsInRankOrderAlsoEmptyOnes) {
   ASSERT_EQ(everywhere.size(), static_cast<std::size_t>(world.size()));
   for (std::size_t rank = 0; rank < everywhere.size(); ++rank)
     EXPECT_EQ(everywhere[rank], std::vector<std::byte>(rank, std::byte(rank)));
+}
+
+// Texts are sent in pieces, and one that is longer than all others in several.
+TEST(Communicator, SendsTextsOfManyLengthsOneAfterTheOther) {
+  const Communicator world = Communicator::world();
+  for (const std::size_t length : {0U, 1U, 0U, 4194303U, 4194304U, 10000001U, 0U, 3U}) {
+    std::string text = world.is_root() ? std::string(length, 'x') : "other";
+    world.broadcast(text);
+    ASSERT_EQ(text, std::string(length, 'x'));
+    const auto everywhere = world.all_gather(std::as_bytes(std::span(text)));
+    for (const auto& part : everywhere) ASSERT_EQ(part.size(), length);
+  }
+}
+
+TEST(Communicator, ReducesMoreThanAMailboxHolds) {
+  const Communicator world = Communicator::world();
+  std::vector<std::uint64_t> values(1000003);
+  for (std::size_t i = 0; i < values.size(); ++i)
+    values[i] = i + static_cast<std::size_t>(world.rank());
+  std::vector<std::uint64_t> largest = values;
+  world.sum(values);
+  world.maximum(largest);
+  const auto n = static_cast<std::uint64_t>(world.size());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    ASSERT_EQ(values[i], n * i + n * (n - 1) / 2) << i;
+    ASSERT_EQ(largest[i], i + n - 1) << i;
+  }
 }
 
 TEST(Communicator, GathersPartsOfVeryDifferentSizes) {
@@ -77,14 +103,7 @@ TEST(Communicator, NodeMemoryThatHasNoRoomIsRefusedOnEveryRank) {
 
 TEST(Communicator, ANodeIsFoundOnce) {
   const Communicator world = Communicator::world();
-  EXPECT_EQ(&world.node().impl(), &Communicator::world().node().impl());
-}
-
-TEST(MpiEnvironment, WithoutSupportOfThreadsIsAnError) {
-  constexpr int kSingle = 0;
-  constexpr int kFunneled = 1;
-  EXPECT_THROW(require_threads(kSingle), RemoteError);
-  EXPECT_NO_THROW(require_threads(kFunneled));
+  EXPECT_EQ(world.node().group(), Communicator::world().node().group());
 }
 
 TEST(Communicator, NodeMemoryIsFilledOnceAndSeenByAll) {
@@ -138,8 +157,8 @@ TEST(Communicator, NodeMemoryFromRankZerosNodeIsFilledByItsRanksTogether) {
   EXPECT_THROW(std::ignore = world.allocate_on_nodes_from_root_together(8, fill), Error);
 }
 
-/// MPI runs here, and every rank is alone all the same. library_test does this without MPI being
-/// initialised.
+/// There are other ranks, and every one is alone all the same. library_test does this where there
+/// are none.
 TEST(CommunicatorAlone, NeedsNoMpi) {
   const Communicator alone = Communicator::alone();
   EXPECT_EQ(alone.rank(), 0);

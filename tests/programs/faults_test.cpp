@@ -54,7 +54,12 @@ class Faults : public testing::Test {
 
   static std::vector<std::string> precompute(int ranks,
                                              const std::vector<std::string>& options = {}) {
-    return test::slow_precompute(ranks, folder_->path(), field(), options);
+    return test::under_mpirun(ranks, test::slow_precompute(folder_->path(), field(), options));
+  }
+  /// The same by processes instead of ranks of MPI.
+  static std::vector<std::string> by_processes(std::vector<std::string> options = {}) {
+    options.insert(options.end(), {"--processes", std::to_string(kRanks)});
+    return test::slow_precompute(folder_->path(), field(), options);
   }
   static std::string words(const std::vector<std::string>& command) {
     std::string line;
@@ -197,6 +202,60 @@ TEST_F(Faults, AFullDiskWhileTheFieldIsWrittenEndsTheJobAtOnce) {
     EXPECT_FALSE(fs::exists(field()));
   }
   expect_going_on();
+}
+
+TEST_F(Faults, ProcessesMakeTheFieldThatRanksMake) {
+  const test::ProgramRun run = test::run_command(words(by_processes()));
+  EXPECT_EQ(run.exit_code, 0) << run.output;
+  EXPECT_EQ(payload(), payload_);
+}
+
+TEST_F(Faults, AKilledProcessIsNamedAndTheJobEnded) {
+  test::LaunchedJob job(by_processes(), output());
+  ASSERT_TRUE(job.wait_until([] { return unit_bytes() > 0; })) << said();
+  ASSERT_EQ(job.ranks().size(), std::size_t{kRanks} - 1);
+  kill(job.ranks().back(), SIGKILL);
+  EXPECT_EQ(job.wait(kEndsWithin), 75) << said();
+  EXPECT_THAT(
+      said(),
+      ContainsRegex("rank [0-9] \\(process [0-9]+\\) was ended by signal 9 \\(Killed\\): the "
+                    "job is ended; run the same command again"));
+  expect_going_on();
+}
+
+TEST_F(Faults, ProcessesEndWithTheFirst) {
+  test::LaunchedJob job(by_processes(), output());
+  ASSERT_TRUE(job.wait_until([] { return unit_bytes() > 0; })) << said();
+  kill(job.launcher(), SIGKILL);
+  EXPECT_EQ(job.wait(kEndsWithin), 128 + SIGKILL) << said();
+  expect_going_on();
+}
+
+TEST_F(Faults, ASignalToTheFirstProcessStopsAll) {
+  test::LaunchedJob job(by_processes(), output());
+  ASSERT_TRUE(job.wait_until([] { return unit_bytes() > 0; })) << said();
+  kill(job.launcher(), SIGTERM);
+  EXPECT_EQ(job.wait(kEndsWithin), 75) << said();
+  EXPECT_THAT(said(), AllOf(HasSubstr("stopped"), HasSubstr("(SIGTERM)")));
+  expect_going_on();
+}
+
+TEST_F(Faults, AFullDiskEndsAllProcesses) {
+  constexpr std::uint64_t kLessThanUnits = 300'000;
+  std::vector<std::string> command = {"prlimit", "--fsize=" + std::to_string(kLessThanUnits)};
+  for (const std::string& word : by_processes()) command.push_back(word);
+  test::LaunchedJob job(command, output());
+  EXPECT_EQ(job.wait(kEndsWithin), 4) << said();
+  EXPECT_THAT(said(),
+              ContainsRegex("rank [0-9] on .*: casting unit .*records: cannot be written: File too "
+                            "large"));
+  expect_going_on();
+}
+
+TEST_F(Faults, RanksOfALauncherAreNotMultiplied) {
+  const test::ProgramRun run = test::run_command(words(precompute(2, {"--processes", "2"})));
+  EXPECT_EQ(run.exit_code, 2) << run.output;
+  EXPECT_THAT(run.output, HasSubstr("--processes"));
 }
 
 TEST_F(Faults, AProgressFolderDeletedMeanwhileIsSaidOrNotNeeded) {

@@ -141,7 +141,7 @@ class KillMatrix : public testing::Test {
   static fs::path path(const std::string& name) { return *folder_ / name; }
 
   static std::vector<std::string> precompute(int ranks, const fs::path& field) {
-    return test::slow_precompute(ranks, folder_->path(), field);
+    return test::under_mpirun(ranks, test::slow_precompute(folder_->path(), field));
   }
   static std::vector<std::string> registration(int ranks, const fs::path& folder) {
     return test::under_mpirun(ranks,

@@ -59,6 +59,7 @@ class NoLauncher : public testing::Test {
 TEST_F(NoLauncher, StartsNoMpi) {
   const std::string field = path("AP.af.h5");
   const ProgramRun made = run_alone(
+      kBrokenMpi +
       precompute("--max-rotation-deg 15 --max-translation-mm 12 --uv-nodes 20 --st-nodes 64 "
                  "--codewords 512 -o " +
                  field));
@@ -83,24 +84,6 @@ TEST_F(NoLauncher, StartsNoMpi) {
       run_alone(kBrokenMpi + program("af-scan --scan " + path("no.toml") + " -o " + path("scan")));
   EXPECT_EQ(scan.exit_code, 4) << scan.output;
   EXPECT_THAT(scan.output, HasSubstr("no.toml"));
-}
-
-TEST_F(NoLauncher, OnlyWritingAFieldStartsMpi) {
-  const ProgramRun dry = run_alone(kBrokenMpi + smallest_field() + " --dry-run");
-  EXPECT_EQ(dry.exit_code, 0) << dry.output;
-  EXPECT_NE(run_alone(kBrokenMpi + smallest_field()).exit_code, 0)
-      << "MPI can start, and these tests show nothing";
-}
-
-// On one machine, Open MPI would give all programs without mpirun the same folder. A program that
-// ended would remove it while another began, which would then fail.
-TEST_F(NoLauncher, AFieldIsWrittenWithoutAFolderOfMpisAndAWordOfIt) {
-  const std::string no_folder = "TMPDIR=" + path("study.toml") + "/temporary ";
-  const ProgramRun run = run_alone(no_folder + smallest_field());
-  EXPECT_EQ(run.exit_code, 0) << run.output;
-  EXPECT_THAT(run.output, Not(HasSubstr("mca_")));
-  EXPECT_NE(run_command(no_folder + kMpirun + program(kInspection)).exit_code, 0)
-      << "the folder can be made, and this test shows nothing";
 }
 
 TEST(NoLauncherProgram, UsageErrorsStartNoMpi) {

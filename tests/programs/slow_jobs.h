@@ -27,8 +27,7 @@ inline std::vector<std::string> under_mpirun(int ranks, const std::vector<std::s
 }
 
 /// af-precompute of a study written by write_small_study().
-inline std::vector<std::string> slow_precompute(int ranks,
-                                                const std::filesystem::path& study_folder,
+inline std::vector<std::string> slow_precompute(const std::filesystem::path& study_folder,
                                                 const std::filesystem::path& field,
                                                 const std::vector<std::string>& options = {}) {
   std::vector<std::string> command = {AF_PROGRAM_FOLDER "/af-precompute", "-o", field.string()};
@@ -50,7 +49,7 @@ inline std::vector<std::string> slow_precompute(int ranks,
     command.emplace_back(word);
   command.push_back((study_folder / "study.toml").string());
   command.insert(command.end(), options.begin(), options.end());
-  return under_mpirun(ranks, command);
+  return command;
 }
 
 }  // namespace af::test

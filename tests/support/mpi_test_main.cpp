@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <array>
 #include <cstdint>
+#include <cstdlib>
 #include <iostream>
+#include <optional>
 #include <string>
 
 #include <gtest/gtest.h>
 
 #include "ranks/communicator.h"
 #include "ranks/mpi_environment.h"
+#include "ranks/process_group.h"
 
 namespace {
 
@@ -33,10 +36,18 @@ class FailurePrinter : public testing::EmptyTestEventListener {
 
 }  // namespace
 
-/// Runs all tests on every rank. Rank 0 prints all results, the others print their failures. The
-/// program fails when any rank failed.
+/// Runs all tests on every rank: of mpirun, or with the words "--processes N" of as many processes.
+/// Rank 0 prints all results, the others print their failures. The program fails when any rank
+/// failed.
 int main(int argc, char** argv) {
-  const af::MpiEnvironment environment(argc, argv);
+  const bool has_processes = argc > 2 && std::string(argv[1]) == "--processes";
+  std::optional<af::MpiEnvironment> environment;
+  if (!has_processes) environment.emplace(argc, argv);
+  const af::ProcessGroup processes(has_processes ? std::stoi(argv[2]) : 1,
+                                   [](const std::string& loss) {
+                                     std::cout << loss << std::endl;
+                                     std::_Exit(1);
+                                   });
   testing::InitGoogleTest(&argc, argv);
   const af::Communicator world = af::Communicator::world();
   if (!world.is_root()) {

@@ -47,7 +47,6 @@ TEST_F(Launcher, IsNoShellOfASlurmJob) {
   set("SLURM_PROCID", "0");
   EXPECT_FALSE(is_launched());
   EXPECT_TRUE(is_first_process());
-  EXPECT_FALSE(is_only_task());
   EXPECT_EQ(lone_task_problem(), "");
 }
 
@@ -67,7 +66,6 @@ TEST_F(Launcher, RefusesOneOfSeveralTasksWithoutPmi) {
 TEST_F(Launcher, LeavesTheOnlyTaskAlone) {
   set("SLURM_STEP_NUM_TASKS", "1");
   set("SLURM_PROCID", "0");
-  EXPECT_TRUE(is_only_task());
   EXPECT_EQ(lone_task_problem(), "");
 }
 
@@ -87,6 +85,15 @@ TEST_F(Launcher, RefusesProcessesThatMpiHasNotJoined) {
   set("PMI_SIZE", "4");
   EXPECT_EQ(split_job_problem(4), "");
   EXPECT_THAT(split_job_problem(1), HasSubstr("PMI_SIZE=4"));
+}
+
+// As srun --mpi=pmix starts programs that were built without MPI.
+TEST_F(Launcher, RefusesTasksWithPmiThatMpiHasNotJoined) {
+  set("PMIX_RANK", "1");
+  set("SLURM_STEP_NUM_TASKS", "2");
+  EXPECT_THAT(split_job_problem(1),
+              AllOf(HasSubstr("SLURM_STEP_NUM_TASKS=2"), HasSubstr("--processes")));
+  EXPECT_EQ(split_job_problem(2), "");
 }
 
 TEST(WorkQueueAlone, HandsOutEveryItemInOrder) {
