@@ -144,6 +144,22 @@ TEST_F(RegisterProgram, SearchesWhereNoStartIsKnown) {
             found.at("start_search").at("likeness_per_start"));
 }
 
+TEST_F(RegisterProgram, SaysWhereTheRangeOfASearchEnds) {
+  // The gold pose is at 2.5, -1.5, 2 mm.
+  const std::string search =
+      "--renderer raycast --no-pictures --preset fast --start search --search-modes 1 "
+      "--search-rotation-deg 4,4,4 --search-translation-mm 2,6,6 -o ";
+  const std::string said =
+      "the likeliest pose lies at the end of the searched range (tx): search further with "
+      "--search-translation-mm 4,6,6\n";
+  expect_refused(run_register(search + path("searched-short") + " --max-evaluations 14"), 0, said);
+  const test::ProgramRun found = run_register(search + path("searched-found"));
+  EXPECT_EQ(found.output.find(said), std::string::npos) << found.output;
+  EXPECT_EQ(result("searched-found").at("verdict"), "found");
+  for (const char* folder : {"searched-short", "searched-found"})
+    EXPECT_EQ(result(folder).at("start_search").at("range_ends_along"), "tx") << folder;
+}
+
 TEST_F(RegisterProgram, SearchesTheRangeOfItsFieldsAndNoFarther) {
   const test::ProgramRun within =
       run_register(fields() + " --no-pictures --start search -o " + path("searched-fields"));
@@ -581,7 +597,12 @@ TEST_F(RegisterProgram, AnEndWhereTheFieldsRangeEndsIsDoubtfulAndSaysAlongWhat) 
   EXPECT_EQ(found.at("stop_reason"), "pinned-at-limit");
   EXPECT_NE(found.at("verdict"), "found");
   EXPECT_NE(found.at("verdict_reason").get<std::string>().find(said), std::string::npos) << found;
-  EXPECT_NE(run.output.find("--renderer raycast --start search"), std::string::npos) << run.output;
+  const std::string further = "--renderer raycast --start search";
+  EXPECT_NE(run.output.find(further), std::string::npos) << run.output;
+  const test::ProgramRun search =
+      run_register(fields("-short") + " --start search -o " + path("pinned-search"));
+  for (const std::string& part : {std::string("the end of the searched range (tx)\n"), further})
+    EXPECT_NE(search.output.find(part), std::string::npos) << search.output;
 }
 
 TEST_F(RegisterProgram, RequireFoundDoesNotAcceptADoubtfulPose) {
