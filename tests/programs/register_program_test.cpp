@@ -7,6 +7,7 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -158,6 +159,26 @@ TEST_F(RegisterProgram, SaysWhereTheRangeOfASearchEnds) {
   EXPECT_EQ(result("searched-found").at("verdict"), "found");
   for (const char* folder : {"searched-short", "searched-found"})
     EXPECT_EQ(result(folder).at("start_search").at("range_ends_along"), "tx") << folder;
+}
+
+TEST_F(RegisterProgram, SearchesForABodyInAirAsForACroppedOne) {
+  const test::ScratchFolder folder;
+  std::vector<nlohmann::json> likenesses;
+  for (const int voxels : {0, 16}) {
+    const fs::path here = folder / std::to_string(voxels);
+    fs::create_directory(here);
+    test::write_small_study(here, test::in_air(test::five_ellipsoids(), voxels));
+    const test::ProgramRun run = test::run_command(
+        program("af-register") + " --study " + (here / "study.toml").string() +
+        " --renderer raycast --preset bone --no-pictures --start search --search-rotation-deg "
+        "15,15,15 --search-translation-mm 20,20,20 -o " +
+        (here / "result").string());
+    // Preset bone finds no bone's silhouette in ellipsoids. The search shows what it looked at.
+    ASSERT_EQ(run.exit_code, 7) << run.output;
+    std::ifstream file(here / "result/result.json");
+    likenesses.push_back(nlohmann::json::parse(file).at("start_search").at("likeness_per_start"));
+  }
+  EXPECT_EQ(likenesses[1], likenesses[0]);
 }
 
 TEST_F(RegisterProgram, SearchesTheRangeOfItsFieldsAndNoFarther) {

@@ -8,6 +8,7 @@
 #include "base/hash_random.h"
 #include "base/vector_width.h"
 #include "geometry/tre.h"
+#include "register/search/searched_view.h"
 #include "unit/register/method/registration_cases.h"
 
 namespace af::registration {
@@ -133,6 +134,25 @@ TEST(PoseSearch, FindsABodyAmongOthersWithinItsSilhouette) {
     EXPECT_LT(whole.modes().front().likeness, search.modes().front().likeness - 0.1)
         << "what lies around the body counts";
   }
+}
+
+TEST(PoseSearch, AirAroundABoneDoesNotCoarsenItsPixels) {
+  const auto small_case_of = [](const CtVolume& ct) {
+    test::SmallCase small = test::small_case(ct);
+    small.problem->attenuating_points_ct =
+        ct_lattice_points(AttenuationVolume(ct, AttenuationModel{}).grid_without_border());
+    return small;
+  };
+  // So few that they are larger than the least.
+  constexpr int kAcross = 16;
+  const test::SmallCase cropped = small_case_of(test::bones_in_a_corner());
+  const test::SmallCase padded = small_case_of(test::in_air(test::bones_in_a_corner(), 20));
+  const double pixel_mm = pixel_mm_of(*cropped.problem, kAcross, 4.0);
+  EXPECT_GT(pixel_mm, pixel_mm_of(*cropped.problem, 64, 4.0));
+  // Doubles hold these grids, multiples of 1.5 mm, exactly.
+  EXPECT_EQ(pixel_mm_of(*padded.problem, kAcross, 4.0), pixel_mm);
+  padded.problem->attenuating_points_ct.clear();
+  EXPECT_GT(pixel_mm_of(*padded.problem, kAcross, 4.0), 2.0 * pixel_mm);
 }
 
 TEST(PoseSearch, ModesOfASmallTargetDifferByTheirRotation) {
