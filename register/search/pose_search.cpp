@@ -2,6 +2,7 @@
 #include "register/search/pose_search.h"
 
 #include <algorithm>
+#include <array>
 #include <bitset>
 #include <cmath>
 #include <cstdint>
@@ -21,6 +22,7 @@
 namespace af::registration {
 namespace {
 
+constexpr std::array kOrientations{"field", "flips", "any"};
 /// Coarse pixels across the longer side of what is compared; DRRs of more tell no more about where
 /// anatomy lies at the steps of this search.
 constexpr int kPixelsAcross = 64;
@@ -364,7 +366,7 @@ void PoseSearchOptions::describe(Fields& field) {
         "Search: 'field' looks at rotations of the fields' range (without fields +-20 "
         "degrees); 'flips' also at the patient turned by 180 degrees about each axis; 'any' at all "
         "rotations. The last two need --renderer raycast")
-      .choice({"field", "flips", "any"});
+      .choice({kOrientations.begin(), kOrientations.end()});
   field("search_rotation_deg",
         rotation_deg,
         "Search: rx,ry,rz farthest from nominal, degrees (default: the fields' range)");
@@ -384,6 +386,9 @@ std::vector<std::string> problems(const PoseSearchOptions& options) {
             found.push_back(std::string(name) + " = " + std::to_string(value) +
                             ": must be from 0 to " + std::to_string(static_cast<int>(most)));
       };
+  if (std::ranges::find(kOrientations, options.orientations) == kOrientations.end())
+    found.push_back("--search-orientations = " + options.orientations + ": must be one of " +
+                    joined(kOrientations));
   check_each(options.rotation_deg, "--search-rotation-deg", 180.0);
   check_each(options.translation_mm, "--search-translation-mm", 1000.0);
   if (options.orientations == "any" && options.rotation_deg.has_value())

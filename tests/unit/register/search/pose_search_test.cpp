@@ -323,7 +323,8 @@ TEST(PoseSearchOptions, NamesEverythingThatIsWrong) {
   PoseSearchOptions options;
   options.rotation_deg = {10.0, -1.0, 181.0};
   options.translation_mm = {10.0, 10.0, 1001.0};
-  EXPECT_EQ(problems(options).size(), 3u);
+  options.orientations = "upright";
+  EXPECT_EQ(problems(options).size(), 4u);
   options = {};
   options.orientations = "any";
   options.rotation_deg = {10.0, 10.0, 10.0};
