@@ -17,6 +17,7 @@
 #include "register/case_loading.h"
 #include "register/method/method_options.h"
 #include "register/method/presets.h"
+#include "register/search/pose_search.h"
 #include "register/verdict/registration.h"
 #include "study/case_gold_standard.h"
 #include "study/landmark_start.h"
@@ -95,10 +96,34 @@ registration::CaseLoadOptions load_options(const RegistrationOptions& options,
   result.fiducial_mask_mm = method_options(options).fiducial_mask_mm;
   result.region_follows_target = method.region_follows_target;
   result.coarsest_level = method.coarsest_level();
+  // search() needs this one for all rotations, which only ray casting shows.
+  if (casts) result.coarsest_level = registration::kCoarsestLevel;
   result.judging_level = registration::PoseExaminer::coarsest_level();
   if (options.correct) result.correction_levels = method.last_levels();
   result.pool = pool;
   return result;
+}
+
+registration::PoseSearchOptions search_options(const SearchOptions& options) {
+  registration::PoseSearchOptions result{
+      options.modes, options.orientations, options.rotation_deg, options.translation_mm};
+  af::Fields fields = af::fields_of(result);
+  fields.at("search_modes").name = "modes";
+  af::throw_if_any(af::field_problems(fields));
+  return result;
+}
+
+/// The problem with as many coarse levels as af-register loads for such a search.
+registration::RegistrationProblem searched_problem(const registration::Registration& registered,
+                                                   const registration::PoseSearchOptions& search) {
+  registration::RegistrationProblem problem = *registered.problem;
+  const auto levels =
+      static_cast<std::size_t>(std::max({registered.method.coarsest_level(),
+                                         registration::PoseExaminer::coarsest_level(),
+                                         coarsest_level(search)}));
+  for (registration::RegistrationView& view : problem.views)
+    view.coarse_levels.resize(std::min(view.coarse_levels.size(), levels));
+  return problem;
 }
 
 /// The image of these pixels. Throws InputError unless there is a value for every pixel of the
@@ -310,6 +335,21 @@ std::optional<Pose> RegistrationCase::landmark_start() const {
 Pose RegistrationCase::usual_start() const {
   const std::optional<Pose> by_landmarks = landmark_start();
   return by_landmarks.has_value() ? *by_landmarks : frame().pose({}, {});
+}
+
+std::vector<PoseMode> RegistrationCase::search(const SearchOptions& options) const {
+  return library::translated([&] {
+    const registration::PoseSearchOptions wanted = search_options(options);
+    const std::lock_guard turn(impl_->mutex);
+    const registration::RegistrationProblem problem =
+        searched_problem(*impl_->registration, wanted);
+    const registration::PoseSearch search(
+        problem, wanted, impl_->registration->method.silhouette_mm(), impl_->pool);
+    std::vector<PoseMode> found;
+    for (const registration::PoseMode& mode : search.modes())
+      found.push_back({library::pose_of(mode.room_from_ct), mode.likeness});
+    return found;
+  });
 }
 
 Registration RegistrationCase::run(const Pose& start, std::int64_t start_index) const {

@@ -464,6 +464,7 @@ LoadedCase load_case(const Study& study,
     if (asks_target(options))
       target = all_or_none(communicator,
                            [&] { return part_within(*node_ct.volume, study_case.target_box_ct); });
+    problem->attenuating_points_ct = ct_lattice_points(node_ct.volume->grid_without_border());
     volumes = cast_volumes(node_ct.volume, options, communicator);
     ray_cast = ray_cast_through(volumes, options.ray_caster, options);
   } else if (!options.skip_ct_check) {

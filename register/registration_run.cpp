@@ -81,12 +81,19 @@ RegistrationOptions method_of(const RegisterOptions& options, const Communicator
   });
 }
 
+/// Where the likeliest pose of a search lies at an end of its range.
+struct SearchEnd {
+  std::string along;  ///< names of parameters; empty: nowhere
+  std::string wider;  ///< PoseSearch::options_beyond()
+};
+
 /// What the study says about the case, the same on every rank.
 struct CaseToRegister {
   Shared<Study> study;
   StudyCase study_case;
   std::optional<LandmarkPose> landmarks;  ///< when they give the start
   nlohmann::json search;                  ///< when a search found the starts; on rank 0
+  SearchEnd search_end;                   ///< likewise
   std::vector<RigidTransform> starts;
   std::optional<GoldStandard> gold;
 };
@@ -97,7 +104,7 @@ void warn_of(const std::vector<std::string>& texts, const Communicator& world) {
 
 /// Collective.
 CaseToRegister read_case(const RegisterOptions& options, const Communicator& world) {
-  CaseToRegister found{shared_study(options.study, world), {}, {}, {}, {}, {}};
+  CaseToRegister found{shared_study(options.study, world), {}, {}, {}, {}, {}, {}};
   found.study_case = all_or_none(world, [&] { return found.study->find_case(options.case_name); });
   if (starts_from_landmarks(options, found.study_case))
     found.landmarks =
@@ -138,10 +145,12 @@ LoadedCase load_problem(const RegisterOptions& options,
 
 nlohmann::json search_json(const PoseSearch& search,
                            const std::vector<PoseMode>& modes,
+                           const SearchEnd& end,
                            double seconds) {
   nlohmann::json likenesses = nlohmann::json::array();
   for (const PoseMode& mode : modes) likenesses.push_back(mode.likeness);
   return {{"range", search.range().text()},
+          {"range_ends_along", end.along},
           {"rotations", search.rotation_count()},
           {"likeness_per_start", likenesses},
           {"seconds", seconds}};
@@ -172,7 +181,9 @@ void find_starts(const RegisterOptions& options,
     const std::vector<PoseMode> modes = search.modes();
     const double seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    registered.search = search_json(search, modes, seconds);
+    const ParameterSet ends = search.ends_at(modes.front().room_from_ct);
+    registered.search_end = {parameter_names(ends), search.options_beyond(ends)};
+    registered.search = search_json(search, modes, registered.search_end, seconds);
     std::cout << search_text(search, modes, seconds);
     std::vector<RigidTransform> starts;
     for (const PoseMode& mode : modes) starts.push_back(mode.room_from_ct);
@@ -222,11 +233,21 @@ void warn_of_clipped(const std::vector<RegistrationRecord>& records, const Commu
            ") and were clipped into it");
 }
 
-/// Says what comes next where the fields' range ends.
+/// Says what comes next where the range of the search or of the fields ends.
 void offer_search(const RegisterOptions& options,
-                  const RegistrationResult& best,
+                  const RegistrationRecord& best,
+                  const SearchEnd& search_end,
                   const Communicator& world) {
-  if (best.pinned_along.empty() && best.clipped_along.empty()) return;
+  // Rotations are coarse, so the right pose often lies in an outer cell. Where it was found, there
+  // is nothing to search for.
+  const bool is_at_end = !search_end.along.empty() && judgement_of(best).verdict != Verdict::Found;
+  if (is_at_end)
+    inform(world,
+           "the likeliest pose lies at the end of the searched range (" + search_end.along + ")" +
+               (search_end.wider.empty() ? "" : ": search further with " + search_end.wider));
+  if (best.result.pinned_along.empty() && best.result.clipped_along.empty() &&
+      !(is_at_end && search_end.wider.empty()))
+    return;
   inform(world,
          "beyond the fields' range: 'af-register " + shell_quoted(options.study.string()) +
              " --renderer raycast --start search' looks for the pose there. Wider fields: "
@@ -259,7 +280,7 @@ void write_results(const RegisterOptions& options,
   registration.diagnose(best);
   warn_of(best.diagnosis.messages, world);
   warn_of_clipped(records, world);
-  offer_search(options, best.result, world);
+  offer_search(options, best, registered.search_end, world);
   const Verdict verdict = judgement_of(best).verdict;
   const bool is_found = verdict != Verdict::NotFound;
   const RegistrationProblem& problem = *registration.problem;

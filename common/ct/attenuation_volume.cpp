@@ -114,6 +114,13 @@ AttenuationVolume::AttenuationVolume(const CtGrid& bordered_grid,
       *std::max_element(voxels_.view().begin(), voxels_.view().end()) * model.mu_per_mm_per_unit();
 }
 
+CtGrid AttenuationVolume::grid_without_border() const {
+  CtGrid inner = grid_;
+  inner.origin_mm = grid_.point_mm(Eigen::Vector3d::Ones());
+  for (int& size : inner.size) size -= 2;
+  return inner;
+}
+
 std::array<Eigen::Vector3d, 8> AttenuationVolume::corner_points() const {
   return corners_mm(grid_);
 }

@@ -56,6 +56,7 @@ class AttenuationVolume {
 
   /// Grid with border: voxel (0, 0, 0) is a border voxel.
   [[nodiscard]] const CtGrid& grid() const { return grid_; }
+  [[nodiscard]] CtGrid grid_without_border() const;
   [[nodiscard]] const AttenuationModel& model() const { return model_; }
   [[nodiscard]] std::span<const std::uint16_t> voxels() const { return voxels_.view(); }
   /// Largest mu in the volume, 1/mm.

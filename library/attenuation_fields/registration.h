@@ -49,6 +49,20 @@ struct RegistrationOptions {
   int threads = 1;                    ///< for one registration; 0: every processor
 };
 
+/// The options --search-... of af-register.
+struct SearchOptions {
+  int modes = 5;                               ///< how many poses are wanted, at most 100
+  std::string orientations = "field";          ///< "field", "flips" or "any"
+  std::optional<Vector3> rotation_deg = {};    ///< farthest from nominal about each axis
+  std::optional<Vector3> translation_mm = {};  ///< likewise along each axis
+};
+
+/// A pose at which DRRs are like the X-rays.
+struct PoseMode {
+  Pose pose;
+  double likeness = 0.0;  ///< the mean over views of a correlation, at most 1
+};
+
 /// Shares of an X-ray's gradients that the DRR at a pose explains, 0 to 1. NaN: not judged.
 struct ViewAgreement {
   std::string camera;
@@ -140,6 +154,11 @@ class ATTENUATION_FIELDS_API RegistrationCase {
   /// Where af-register starts when it is given no start: at landmark_start(), or else at the
   /// nominal pose. Throws InputError as landmark_start() does.
   [[nodiscard]] Pose usual_start() const;
+
+  /// Poses from which to register when nobody knows a start: those from which `af-register --start
+  /// search` registers, to the bit. The likeliest comes first. Throws InputError for options that a
+  /// field does not hold, and when nothing is like the X-rays.
+  [[nodiscard]] std::vector<PoseMode> search(const SearchOptions& options = {}) const;
 
   /// Registers from a start. `start_index` is a key of random numbers. The result is what
   /// af-register writes into result.json, to the bit (except its seconds).

@@ -102,6 +102,27 @@ void bind_result(py::module_& module) {
              &Registration::seconds);
 }
 
+void bind_pose_mode(py::module_& module) {
+  py::class_<PoseMode> mode(module, "PoseMode", "A pose at which DRRs are like the X-rays.");
+  mode.def_property_readonly(
+      "pose", [](const PoseMode& self) { return matrix_of(self.pose); }, "room_from_ct (4x4)");
+  mode.def_readonly(
+      "likeness", &PoseMode::likeness, "The mean over views of a correlation, at most 1.");
+  def_pickle(mode, &PoseMode::pose, &PoseMode::likeness);
+}
+
+std::vector<PoseMode> search(const PythonCase& self,
+                             int modes,
+                             const std::string& orientations,
+                             const std::optional<Numbers>& rotation_deg,
+                             const std::optional<Numbers>& translation_mm) {
+  SearchOptions options{modes, orientations, {}, {}};
+  if (rotation_deg.has_value()) options.rotation_deg = vector_of(*rotation_deg, "rotation_deg");
+  if (translation_mm.has_value())
+    options.translation_mm = vector_of(*translation_mm, "translation_mm");
+  return without_lock([&] { return self.search(options); });
+}
+
 /// The pixels themselves, read-only. The array keeps their owner alive.
 py::array_t<float> image_of(const CaseView& view, std::span<const float> pixels) {
   using Owner = std::shared_ptr<const void>;
@@ -320,6 +341,17 @@ void bind_case(py::module_& module) {
       "pose"_a,
       "Target registration error of a 4x4 pose; None without a gold pose.");
   registration_case.def(
+      "search",
+      &search,
+      py::kw_only(),
+      "modes"_a = SearchOptions{}.modes,
+      "orientations"_a = SearchOptions{}.orientations,
+      "rotation_deg"_a = py::none(),
+      "translation_mm"_a = py::none(),
+      "Poses to register from when nobody knows a start, the likeliest first: those of af-register "
+      "--start search. orientations: 'field', 'flips' or 'any'. rotation_deg, translation_mm: "
+      "farthest from nominal about and along each axis [the fields' range; 20, 40 without].");
+  registration_case.def(
       "run",
       [](const PythonCase& self, const std::optional<Numbers>& start, std::int64_t index) {
         std::optional<Pose> pose;
@@ -354,6 +386,7 @@ void bind_case(py::module_& module) {
 
 void bind_registration(py::module_& module) {
   bind_result(module);
+  bind_pose_mode(module);
   bind_case(module);
   module.def("preset_names", &preset_names);
 }

@@ -67,6 +67,8 @@ struct RegistrationProblem {
   Eigen::Vector3d center_ct_mm = Eigen::Vector3d::Zero();     ///< c_roi: origin of all rotations
   Eigen::Vector3d isocenter_point = Eigen::Vector3d::Zero();  ///< room, mm
   std::vector<Eigen::Vector3d> scaling_points_ct;             ///< see ct_lattice_points()
+  /// The same for what attenuates alone, where rays are cast: air around it has no extent there.
+  std::vector<Eigen::Vector3d> attenuating_points_ct;
   std::vector<RegistrationView> views;
   std::optional<CtBox> target_box_ct;             ///< needed by regions that follow it
   std::vector<Eigen::Vector3d> target_points_ct;  ///< of the target box; needed by a correction

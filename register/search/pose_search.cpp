@@ -2,13 +2,17 @@
 #include "register/search/pose_search.h"
 
 #include <algorithm>
+#include <array>
+#include <bitset>
 #include <cmath>
 #include <cstdint>
 #include <numbers>
 #include <span>
+#include <sstream>
 #include <utility>
 
 #include "base/error.h"
+#include "base/joined.h"
 #include "geometry/tre.h"
 #include "register/method/registration_options.h"
 #include "register/problem/target_region.h"
@@ -18,6 +22,7 @@
 namespace af::registration {
 namespace {
 
+constexpr std::array kOrientations{"field", "flips", "any"};
 /// Coarse pixels across the longer side of what is compared; DRRs of more tell no more about where
 /// anatomy lies at the steps of this search.
 constexpr int kPixelsAcross = 64;
@@ -39,6 +44,9 @@ constexpr double kPixelsPerRotation = 4.0;
 /// Range without fields and without a stated one.
 constexpr double kUsualRotationRad = 20.0 * kRadPerDeg;
 constexpr double kUsualTranslationMm = 40.0;
+constexpr std::size_t kMostRotations = 20000;
+/// A range about an axis that holds every angle has no ends.
+constexpr double kHalfTurnRad = std::numbers::pi;
 /// Maxima of one rotation that are kept: more only repeat each other.
 constexpr std::size_t kMaximaPerRotation = 8;
 /// Modes lie at least this far from each other: registrations that start nearer end at the same
@@ -107,23 +115,27 @@ MotionLimit searched_range(const RegistrationProblem& problem, const PoseSearchO
   return searched;
 }
 
-/// Rotations from ct to room. `step_rad`: between neighbours.
-std::vector<Eigen::Matrix3d> searched_rotations(const PoseSearchOptions& options,
-                                                const MotionLimit& searched,
-                                                double step_rad) {
-  const Eigen::Matrix3d& nominal = searched.frame.rotation;
+/// The rotations from ct to room about which others are searched.
+std::vector<Eigen::Matrix3d> searched_orientations(const PoseSearchOptions& options,
+                                                   const Eigen::Matrix3d& nominal) {
   std::vector<Eigen::Matrix3d> turned{nominal};
   if (options.orientations == "flips") {
     turned.clear();
     for (const Eigen::Matrix3d& turn : half_turns()) turned.emplace_back(nominal * turn);
   }
+  return turned;
+}
+
+/// Rotations from ct to room. `step_rad`: between neighbours.
+std::vector<Eigen::Matrix3d> searched_rotations(const PoseSearchOptions& options,
+                                                const MotionLimit& searched,
+                                                double step_rad) {
   const std::vector<Eigen::Matrix3d> moved = options.orientations == "any"
                                                  ? all_rotations(step_rad)
                                                  : rotations_of_range(searched.range, step_rad);
   std::vector<Eigen::Matrix3d> rotations;
-  for (const Eigen::Matrix3d& from : turned)
+  for (const Eigen::Matrix3d& from : searched_orientations(options, searched.frame.rotation))
     for (const Eigen::Matrix3d& by : moved) rotations.emplace_back(by * from);
-  constexpr std::size_t kMostRotations = 20000;
   if (rotations.size() > kMostRotations)
     throw InputError("--search-rotation-deg",
                      searched.range.text(),
@@ -354,7 +366,7 @@ void PoseSearchOptions::describe(Fields& field) {
         "Search: 'field' looks at rotations of the fields' range (without fields +-20 "
         "degrees); 'flips' also at the patient turned by 180 degrees about each axis; 'any' at all "
         "rotations. The last two need --renderer raycast")
-      .choice({"field", "flips", "any"});
+      .choice({kOrientations.begin(), kOrientations.end()});
   field("search_rotation_deg",
         rotation_deg,
         "Search: rx,ry,rz farthest from nominal, degrees (default: the fields' range)");
@@ -374,6 +386,9 @@ std::vector<std::string> problems(const PoseSearchOptions& options) {
             found.push_back(std::string(name) + " = " + std::to_string(value) +
                             ": must be from 0 to " + std::to_string(static_cast<int>(most)));
       };
+  if (std::ranges::find(kOrientations, options.orientations) == kOrientations.end())
+    found.push_back("--search-orientations = " + options.orientations + ": must be one of " +
+                    joined(kOrientations));
   check_each(options.rotation_deg, "--search-rotation-deg", 180.0);
   check_each(options.translation_mm, "--search-translation-mm", 1000.0);
   if (options.orientations == "any" && options.rotation_deg.has_value())
@@ -451,6 +466,66 @@ const MotionRange& PoseSearch::range() const {
 
 std::size_t PoseSearch::rotation_count() const {
   return parts_->rotations.size();
+}
+
+ParameterSet PoseSearch::ends_at(const RigidTransform& room_from_ct) const {
+  const auto& [frame, range] = parts_->searched;
+  const Looking& looking = parts_->looking;
+  const std::vector<Eigen::Matrix3d> orientations =
+      searched_orientations(parts_->options, frame.rotation);
+  PoseFrame nearest = frame;
+  nearest.rotation =
+      *std::ranges::max_element(orientations, {}, [&](const Eigen::Matrix3d& orientation) {
+        return (orientation.transpose() * room_from_ct.linear()).trace();
+      });
+  const PoseParameters at = parameters_from_pose(nearest, room_from_ct);
+  const std::bitset<3> outer =
+      parts_->options.orientations == "any"
+          ? std::bitset<3>()
+          : in_outer_cells(range, looking.rotation_step_rad, at.rotation_rad);
+  ParameterSet ends;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto axis = static_cast<Eigen::Index>(i);
+    const bool is_depth =
+        looking.views.size() == 1 && std::pow(looking.views.front().along_beam[axis], 2) > 0.5;
+    ends[i] = outer[i] && range.high.rotation_rad[axis] < kHalfTurnRad - 1e-9;
+    ends[i + 3] = !is_depth && looking.lattice.axes[i].is_at_end(at.translation_mm[axis]);
+  }
+  return ends;
+}
+
+std::string PoseSearch::options_beyond(const ParameterSet& ends) const {
+  MotionRange wider = parts_->searched.range;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto axis = static_cast<Eigen::Index>(i);
+    for (PoseParameters* const bound : {&wider.low, &wider.high}) {
+      double& angle_rad = bound->rotation_rad[axis];
+      if (ends[i]) angle_rad = std::clamp(2.0 * angle_rad, -kHalfTurnRad, kHalfTurnRad);
+      if (ends[i + 3]) bound->translation_mm[axis] *= 2.0;
+    }
+  }
+  const Looking& looking = parts_->looking;
+  const std::optional<MotionLimit> of_fields = reach_of_fields(looking.problem);
+  if (of_fields.has_value() &&
+      !(of_fields->range.contains(wider.low) && of_fields->range.contains(wider.high)))
+    return "";
+  const std::array<double, 6> high = wider.high.deg_and_mm();
+  const auto numbers = [&](std::size_t first) {
+    std::ostringstream text;
+    text.precision(4);
+    text << high[first] << ',' << high[first + 1] << ',' << high[first + 2];
+    return text.str();
+  };
+  std::vector<std::string> options;
+  if (ends[0] || ends[1] || ends[2]) {
+    const std::size_t rotations =
+        rotations_of_range(wider, looking.rotation_step_rad).size() *
+        searched_orientations(parts_->options, parts_->searched.frame.rotation).size();
+    options.push_back(rotations > kMostRotations ? "--search-orientations any"
+                                                 : "--search-rotation-deg " + numbers(0));
+  }
+  if (ends[3] || ends[4] || ends[5]) options.push_back("--search-translation-mm " + numbers(3));
+  return joined(options, " ");
 }
 
 std::vector<PoseMode> PoseSearch::modes() const {

@@ -83,6 +83,13 @@ class PoseSearch {
   [[nodiscard]] const MotionRange& range() const;
   [[nodiscard]] std::size_t rotation_count() const;
 
+  /// Along which parameters a mode lies at an end of the range, so that a likelier pose may lie
+  /// beyond. Not where the grid has no place between the ends, nor along the beam of a single view,
+  /// which hardly shows depth. \test PoseSearch.KnowsWhereItsRangeEnds
+  [[nodiscard]] ParameterSet ends_at(const RigidTransform& room_from_ct) const;
+  /// The options that search twice as far along these. Empty where the fields do not reach so far.
+  [[nodiscard]] std::string options_beyond(const ParameterSet& ends) const;
+
  private:
   struct Parts;
   std::unique_ptr<Parts> parts_;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <numbers>
 
 #include "geometry/rigid_transform.h"
@@ -54,6 +55,21 @@ std::vector<Eigen::Matrix3d> rotations_of_range(const MotionRange& range, double
       for (const double z : cell_middles(low.z(), high.z(), step_rad))
         rotations.push_back(rotation_from_angles({x, y, z}));
   return rotations;
+}
+
+std::bitset<3> in_outer_cells(const MotionRange& range,
+                              double step_rad,
+                              const Eigen::Vector3d& rotation_rad) {
+  std::bitset<3> found;
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::vector<double> middles =
+        cell_middles(range.low.rotation_rad[axis], range.high.rotation_rad[axis], step_rad);
+    if (middles.size() < 3) continue;
+    const double half = 0.5 * (middles[1] - middles[0]);
+    found[static_cast<std::size_t>(axis)] =
+        rotation_rad[axis] < middles.front() + half || rotation_rad[axis] > middles.back() - half;
+  }
+  return found;
 }
 
 std::vector<Eigen::Matrix3d> all_rotations(double step_rad) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <bitset>
 #include <vector>
 
 #include <Eigen/Core>
@@ -13,6 +14,12 @@ namespace af::registration {
 /// `step_rad` of one of them along each of the three angles: the middles of equal cells.
 /// \test RotationSet.EveryRotationOfARangeHasOneNearby
 std::vector<Eigen::Matrix3d> rotations_of_range(const MotionRange& range, double step_rad);
+
+/// About which axes a rotation lies in the first or the last of three or more such cells: only an
+/// inner one tells that nothing better lies beyond. \test RotationSet.KnowsTheOuterCellsOfARange
+std::bitset<3> in_outer_cells(const MotionRange& range,
+                              double step_rad,
+                              const Eigen::Vector3d& rotation_rad);
 
 /// Rotations such that every rotation is near one of them: about each of the 24 that map a cube
 /// onto itself, rotation vectors on a cubic grid of at most `step_rad`, as far as no other of the

@@ -124,10 +124,12 @@ ScaledImage scaled_about(const Image2d& image, const Eigen::Vector2d& fixed_px, 
   return {resampled_bilinearly(image, columns, rows), std::move(used)};
 }
 
-/// How far the CT reaches from the centre of rotations.
+/// How far the CT's body reaches from the centre of rotations.
 double radius_about_center_mm(const RegistrationProblem& problem) {
   double radius_mm = 0.0;
-  for (const Eigen::Vector3d& point : problem.scaling_points_ct)
+  for (const Eigen::Vector3d& point : problem.attenuating_points_ct.empty()
+                                          ? problem.scaling_points_ct
+                                          : problem.attenuating_points_ct)
     radius_mm = std::max(radius_mm, (point - problem.center_ct_mm).norm());
   return radius_mm;
 }

@@ -25,6 +25,10 @@ int Steps::nearest(double value) const {
   return static_cast<int>(std::lround(std::clamp((value - first) / step, 0.0, count - 1.0)));
 }
 
+bool Steps::is_at_end(double value) const {
+  return count > 2 && (nearest(value) == 0 || nearest(value) == count - 1);
+}
+
 TranslationLattice::TranslationLattice(const MotionRange& range, double step_mm)
     : axes{Steps(range.low.translation_mm.x(), range.high.translation_mm.x(), step_mm),
            Steps(range.low.translation_mm.y(), range.high.translation_mm.y(), step_mm),

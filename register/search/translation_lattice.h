@@ -21,6 +21,8 @@ struct Steps {
   Steps(double low, double high, double widest);
   [[nodiscard]] double at(int i) const { return first + i * step; }
   [[nodiscard]] int nearest(double value) const;
+  /// Whether the first or the last of three or more is the nearest.
+  [[nodiscard]] bool is_at_end(double value) const;
 };
 
 /// A box of a lattice's nodes.

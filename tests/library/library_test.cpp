@@ -422,6 +422,43 @@ TEST(LibraryRegistration, RegistersSeveralStartsAsTheProgram) {
   EXPECT_EQ(rate.rate, 1.0);
 }
 
+void expect_starts_of(const std::string& folder, const std::vector<PoseMode>& found) {
+  const nlohmann::json expected = result_of(folder);
+  std::vector<double> likenesses;
+  for (const PoseMode& mode : found) likenesses.push_back(mode.likeness);
+  EXPECT_EQ(nlohmann::json(likenesses), expected.at("start_search").at("likeness_per_start"));
+  const auto& start = expected.at("start_room_from_ct");
+  const Pose& pose = found.at(expected.at("start_index").get<std::size_t>()).pose;
+  for (std::size_t row = 0; row < 4; ++row)
+    for (std::size_t column = 0; column < 4; ++column)
+      EXPECT_EQ(pose.room_from_ct[4 * row + column], start[row][column].get<double>());
+}
+
+TEST(LibraryRegistration, SearchesForTheStartsOfTheProgram) {
+  RegistrationOptions options;
+  options.preset = "fast";
+  options.renderer = "raycast";
+  options.threads = 2;
+  const RegistrationCase cast = RegistrationCase::load(study_file("study.toml"), "", options);
+  expect_starts_of(
+      "searched",
+      cast.search(
+          {.modes = 3, .orientations = "any", .translation_mm = Vector3{20.0, 20.0, 20.0}}));
+  options.renderer = "field";
+  options.fields = {{"AP", study_file("AP.af.h5")}, {"LAT", study_file("LAT.af.h5")}};
+  const RegistrationCase looked_up = RegistrationCase::load(study_file("study.toml"), "", options);
+  expect_starts_of("searched-fields", looked_up.search());
+
+  const auto refusal = [&](const SearchOptions& search) {
+    return message_of<InputError>([&] { (void)looked_up.search(search); });
+  };
+  EXPECT_THAT(refusal({.modes = 0}), HasSubstr("modes = 0: must be at least 1 and at most 100"));
+  EXPECT_THAT(refusal({.orientations = "upright"}), HasSubstr("must be one of field, flips, any"));
+  EXPECT_THAT(refusal({.rotation_deg = Vector3{1.0, -2.0, 1.0}}), HasSubstr("rotation_deg = -2"));
+  EXPECT_THAT(refusal({.orientations = "any"}),
+              HasSubstr("; renderer raycast searches everywhere"));
+}
+
 TEST(LibraryRegistration, LeavesOutTheUncertaintyAndNothingElse) {
   RegistrationOptions options;
   options.preset = "fast";

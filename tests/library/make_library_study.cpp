@@ -109,6 +109,12 @@ void make(const fs::path& folder, const std::string& programs) {
   for (const std::string preset : {"paper", "fast", "robust", "bone"})
     run(programs + "/af-register" + study + fields + start + preset + " -o " +
         (folder / preset).string() + " || test $? -eq 7");  // "not found" is an answer to compare
+  const std::string search = " --preset fast --no-pictures --start search";
+  run(programs + "/af-register" + study + " --renderer raycast" + search +
+      " --search-modes 3 --search-orientations any --search-translation-mm 20,20,20 -o " +
+      (folder / "searched").string());
+  run(programs + "/af-register" + study + fields + search + " -o " +
+      (folder / "searched-fields").string());
   std::ofstream(folder / "starts.csv") << "rx_deg,ry_deg,rz_deg,tx_mm,ty_mm,tz_mm\n"
                                           "-1,0.5,2.5,0.5,1,4\n"
                                           "1,1,-1,-2,3,-1\n";

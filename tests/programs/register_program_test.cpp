@@ -7,6 +7,7 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -142,6 +143,42 @@ TEST_F(RegisterProgram, SearchesWhereNoStartIsKnown) {
     EXPECT_EQ(same.at(key), found.at(key)) << key;
   EXPECT_EQ(same.at("start_search").at("likeness_per_start"),
             found.at("start_search").at("likeness_per_start"));
+}
+
+TEST_F(RegisterProgram, SaysWhereTheRangeOfASearchEnds) {
+  // The gold pose is at 2.5, -1.5, 2 mm.
+  const std::string search =
+      "--renderer raycast --no-pictures --preset fast --start search --search-modes 1 "
+      "--search-rotation-deg 4,4,4 --search-translation-mm 2,6,6 -o ";
+  const std::string said =
+      "the likeliest pose lies at the end of the searched range (tx): search further with "
+      "--search-translation-mm 4,6,6\n";
+  expect_refused(run_register(search + path("searched-short") + " --max-evaluations 14"), 0, said);
+  const test::ProgramRun found = run_register(search + path("searched-found"));
+  EXPECT_EQ(found.output.find(said), std::string::npos) << found.output;
+  EXPECT_EQ(result("searched-found").at("verdict"), "found");
+  for (const char* folder : {"searched-short", "searched-found"})
+    EXPECT_EQ(result(folder).at("start_search").at("range_ends_along"), "tx") << folder;
+}
+
+TEST_F(RegisterProgram, SearchesForABodyInAirAsForACroppedOne) {
+  const test::ScratchFolder folder;
+  std::vector<nlohmann::json> likenesses;
+  for (const int voxels : {0, 16}) {
+    const fs::path here = folder / std::to_string(voxels);
+    fs::create_directory(here);
+    test::write_small_study(here, test::in_air(test::five_ellipsoids(), voxels));
+    const test::ProgramRun run = test::run_command(
+        program("af-register") + " --study " + (here / "study.toml").string() +
+        " --renderer raycast --preset bone --no-pictures --start search --search-rotation-deg "
+        "15,15,15 --search-translation-mm 20,20,20 -o " +
+        (here / "result").string());
+    // Preset bone finds no bone's silhouette in ellipsoids. The search shows what it looked at.
+    ASSERT_EQ(run.exit_code, 7) << run.output;
+    std::ifstream file(here / "result/result.json");
+    likenesses.push_back(nlohmann::json::parse(file).at("start_search").at("likeness_per_start"));
+  }
+  EXPECT_EQ(likenesses[1], likenesses[0]);
 }
 
 TEST_F(RegisterProgram, SearchesTheRangeOfItsFieldsAndNoFarther) {
@@ -581,7 +618,12 @@ TEST_F(RegisterProgram, AnEndWhereTheFieldsRangeEndsIsDoubtfulAndSaysAlongWhat) 
   EXPECT_EQ(found.at("stop_reason"), "pinned-at-limit");
   EXPECT_NE(found.at("verdict"), "found");
   EXPECT_NE(found.at("verdict_reason").get<std::string>().find(said), std::string::npos) << found;
-  EXPECT_NE(run.output.find("--renderer raycast --start search"), std::string::npos) << run.output;
+  const std::string further = "--renderer raycast --start search";
+  EXPECT_NE(run.output.find(further), std::string::npos) << run.output;
+  const test::ProgramRun search =
+      run_register(fields("-short") + " --start search -o " + path("pinned-search"));
+  for (const std::string& part : {std::string("the end of the searched range (tx)\n"), further})
+    EXPECT_NE(search.output.find(part), std::string::npos) << search.output;
 }
 
 TEST_F(RegisterProgram, RequireFoundDoesNotAcceptADoubtfulPose) {

@@ -601,6 +601,36 @@ class RegistrationTest(unittest.TestCase):
             expected = af.read_result(Path(folder, "out"))
             self.assertEqual(found.pose.tobytes(), expected.room_from_ct.tobytes())
 
+    def test_a_search_finds_the_starts_of_the_program(self):
+        study = STUDY / "study.toml"
+        cast = af.RegistrationCase.load(study, preset="fast", renderer="raycast")
+        looked_up = af.RegistrationCase.load(study, preset="fast", fields=self.fields)
+        everywhere = {"modes": 3, "orientations": "any", "translation_mm": (20, 20, 20)}
+        for folder, case, options in (
+            ("searched", cast, everywhere), ("searched-fields", looked_up, {}),
+        ):
+            with self.subTest(folder):
+                modes = case.search(**options)
+                expected = af.read_result(STUDY / folder)
+                self.assertEqual(
+                    [mode.likeness for mode in modes],
+                    expected.contents["start_search"]["likeness_per_start"],
+                )
+                index = expected.contents["start_index"]
+                start = modes[index].pose
+                np.testing.assert_array_equal(start, expected.contents["start_room_from_ct"])
+                end = case.run(start, index)
+                self.assertEqual(end.pose.tobytes(), expected.room_from_ct.tobytes())
+        for options, text in (
+            ({"modes": 0}, "modes = 0: must be at least 1"),
+            ({"orientations": "upright"}, "orientations = upright: must be one of field"),
+            ({"rotation_deg": (1, -2, 1)}, "rotation_deg = -2"),
+            ({"translation_mm": (1, 2)}, r"translation_mm: shape = \(2,\): must be \(3,\)"),
+            ({"orientations": "any"}, "; renderer raycast searches everywhere"),
+        ):
+            with self.assertRaisesRegex(af.InputError, text):
+                looked_up.search(**options)
+
     def test_uncertainty_may_be_left_out(self):
         case = af.RegistrationCase.load(
             STUDY / "study.toml", preset="fast", fields=self.fields, no_uncertainty=True
@@ -687,8 +717,8 @@ class PickleTest(unittest.TestCase):
         rig = af.Rig.read(STUDY / "rig.toml")
         for value in (
             rig, rig.cameras[0], case.frame, af.Ct.read(STUDY / "ct.nii.gz"), found, found.uncertainty,
-            *found.views, *case.views, af.success_rate([1.0, 3.0]), af.Table.read(STUDY / "starts.csv"),
-            open_field(), case, af.read_result(STUDY / "fast"),
+            *found.views, *case.views, *case.search(), af.success_rate([1.0, 3.0]),
+            af.Table.read(STUDY / "starts.csv"), open_field(), case, af.read_result(STUDY / "fast"),
         ):
             with self.subTest(type(value).__name__):
                 for again in (copy.copy(value), copy.deepcopy(value)):

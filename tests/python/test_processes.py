@@ -90,6 +90,10 @@ class InterruptTest(unittest.TestCase):
         "one drr": ("made = caster(step_mm=0.01)", "call = lambda: [made.drr() for _ in range(1)]"),
         "gradients": ("made = caster(2)", "call = lambda: made.drrs_and_gradients(np.zeros((2000, 6)))"),
         "registrations": ("made = case(2)", "call = lambda: made.run_all(starts(made, 5000))"),
+        "a search": (
+            "made = af.RegistrationCase.load(f'{study}/study.toml', renderer='raycast', threads=2)",
+            "call = lambda: made.search(orientations='any')",
+        ),
         "a registration": (
             "made = af.RegistrationCase.load(f'{study}/study.toml', renderer='raycast', step_mm=0.01)",
             "call = lambda: made.run(starts(made, 1)[0])",

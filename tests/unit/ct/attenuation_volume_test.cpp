@@ -34,6 +34,8 @@ TEST(AttenuationVolume, KeepsOnlyTheAttenuatingBoxWithAZeroBorder) {
   const AttenuationVolume volume(ct, {});
   EXPECT_EQ(volume.grid().size, (std::array<int, 3>{8, 3, 6}));
   EXPECT_TRUE(volume.grid().origin_mm.isApprox(ct.grid.point_mm({3, 2, 1})));
+  EXPECT_EQ(volume.grid_without_border().size, (std::array<int, 3>{6, 1, 4}));
+  EXPECT_TRUE(volume.grid_without_border().origin_mm.isApprox(ct.grid.point_mm({4, 3, 2})));
   std::size_t attenuating = 0;
   for (const std::uint16_t voxel : volume.voxels()) {
     EXPECT_TRUE(voxel == 0 || voxel == 1500);

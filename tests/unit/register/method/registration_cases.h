@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <memory>
+#include <utility>
+#include <vector>
 
 #include "drr/ray_cast_drr.h"
 #include "register/problem/pose_target.h"
@@ -49,6 +54,23 @@ inline CtVolume bones_in_a_corner() {
                             {{22, 12, -12}, {14, 5, 5}, Eigen::Matrix3d::Identity(), 1100},
                             {{1, 2, 30}, {6, 8, 5}, Eigen::Matrix3d::Identity(), 800}},
                            2);
+}
+
+/// The CT with so many more voxels of air on every side.
+inline CtVolume in_air(const CtVolume& ct, int voxels) {
+  CtGrid grid = ct.grid;
+  grid.origin_mm = ct.grid.point_mm(Eigen::Vector3d::Constant(-voxels));
+  for (int& size : grid.size) size += 2 * voxels;
+  std::vector<std::int16_t> hu(grid.voxel_count(), -1000);
+  const auto at = [](const CtGrid& of, int j, int k) {
+    return static_cast<std::ptrdiff_t>(of.size[0]) * (k * of.size[1] + j);
+  };
+  for (int k = 0; k < ct.grid.size[2]; ++k)
+    for (int j = 0; j < ct.grid.size[1]; ++j)
+      std::copy_n(ct.hu.data() + at(ct.grid, j, k),
+                  ct.grid.size[0],
+                  hu.begin() + at(grid, j + voxels, k + voxels) + voxels);
+  return {grid, SharedArray<std::int16_t>(std::move(hu))};
 }
 
 struct SmallCase {

@@ -8,6 +8,7 @@
 #include "base/hash_random.h"
 #include "base/vector_width.h"
 #include "geometry/tre.h"
+#include "register/search/searched_view.h"
 #include "unit/register/method/registration_cases.h"
 
 namespace af::registration {
@@ -135,6 +136,25 @@ TEST(PoseSearch, FindsABodyAmongOthersWithinItsSilhouette) {
   }
 }
 
+TEST(PoseSearch, AirAroundABoneDoesNotCoarsenItsPixels) {
+  const auto small_case_of = [](const CtVolume& ct) {
+    test::SmallCase small = test::small_case(ct);
+    small.problem->attenuating_points_ct =
+        ct_lattice_points(AttenuationVolume(ct, AttenuationModel{}).grid_without_border());
+    return small;
+  };
+  // So few that they are larger than the least.
+  constexpr int kAcross = 16;
+  const test::SmallCase cropped = small_case_of(test::bones_in_a_corner());
+  const test::SmallCase padded = small_case_of(test::in_air(test::bones_in_a_corner(), 20));
+  const double pixel_mm = pixel_mm_of(*cropped.problem, kAcross, 4.0);
+  EXPECT_GT(pixel_mm, pixel_mm_of(*cropped.problem, 64, 4.0));
+  // Doubles hold these grids, multiples of 1.5 mm, exactly.
+  EXPECT_EQ(pixel_mm_of(*padded.problem, kAcross, 4.0), pixel_mm);
+  padded.problem->attenuating_points_ct.clear();
+  EXPECT_GT(pixel_mm_of(*padded.problem, kAcross, 4.0), 2.0 * pixel_mm);
+}
+
 TEST(PoseSearch, ModesOfASmallTargetDifferByTheirRotation) {
   const test::SmallCase small = small_case_at({});
   const RigidTransform here = RigidTransform::Identity();
@@ -185,6 +205,70 @@ TEST(PoseSearch, ModesAreApartAndInOrder) {
       EXPECT_LE(modes[i].likeness, modes[k].likeness);
       EXPECT_TRUE(are_apart(*small.problem, modes[i].room_from_ct, modes[k].room_from_ct, 20.0));
     }
+}
+
+/// Where a search says that its range ends, and which options it names: "tx: --search-...".
+std::string end_text(const PoseSearch& search, const RigidTransform& pose) {
+  const ParameterSet ends = search.ends_at(pose);
+  return parameter_names(ends) + ": " + search.options_beyond(ends);
+}
+
+TEST(PoseSearch, KnowsWhereItsRangeEnds) {
+  // The patient lies 3 mm, less than a coarse pixel, beyond it, and is turned as in an outer cell.
+  const test::SmallCase beyond =
+      small_case_at(PoseParameters::from_deg_and_mm({0, 0, 17, -23, 4, -3}));
+  PoseSearchOptions options;
+  options.rotation_deg = {0.0, 0.0, 20.0};
+  options.translation_mm = {20.0, 20.0, 20.0};
+  const PoseSearch search(*beyond.problem, options);
+  EXPECT_EQ(end_text(search, search.modes().front().room_from_ct),
+            "rz, tx: --search-rotation-deg 0,0,40 --search-translation-mm 40,20,20");
+}
+
+TEST(PoseSearch, NamesAnEndWhereMoreIsPossible) {
+  const test::SmallCase small = small_case_at({});
+  const auto end_at = [&](const PoseSearchOptions& options, const std::array<double, 6>& values) {
+    return end_text(
+        PoseSearch(*small.problem, options),
+        pose_from_parameters(small.problem->frame(), PoseParameters::from_deg_and_mm(values)));
+  };
+  PoseSearchOptions options;
+  EXPECT_EQ(end_at(options, {5, -5, 5, 36, -36, 0}), ": ");
+  EXPECT_EQ(end_at(options, {15, -5, -15, 40, 0, -40}),
+            "rx, rz, tx, tz: --search-rotation-deg 40,20,40 --search-translation-mm 80,40,80");
+  // Half turned, with 15 degrees about x after that.
+  options.orientations = "flips";
+  EXPECT_EQ(end_at(options, {-165, 5, 0, 0, 0, 0}), "rx: --search-rotation-deg 40,20,20");
+  options.orientations = "any";
+  EXPECT_EQ(end_at(options, {120, 5, 0, 0, 40, 0}), "ty: --search-translation-mm 40,80,40");
+  // No rotation about z is left, and twice the range has more rotations than all need.
+  options.orientations = "field";
+  options.rotation_deg = {85.0, 85.0, 180.0};
+  EXPECT_EQ(end_at(options, {0, 81, 176, 0, 0, 0}), "ry: --search-orientations any");
+  // A range of one or two steps has nothing between its ends.
+  options.rotation_deg = {5.0, 10.0, 0.0};
+  options.translation_mm = {1.0, 0.0, 40.0};
+  EXPECT_EQ(end_at(options, {0, 5, 0, 1, 0, 0}), ": ");
+  // AP looks along y.
+  small.problem->views.resize(1);
+  EXPECT_EQ(end_at({}, {0, 0, 0, 40, 40, 0}), "tx: --search-translation-mm 80,40,40");
+}
+
+TEST(PoseSearch, NamesNoOptionsForWhatAFieldDoesNotHold) {
+  const test::SmallCase small = small_case_at({});
+  small.problem->views[0].reach =
+      MotionLimit{small.problem->frame(), MotionRange(10.0 * kRadPerDeg, 20.0)};
+  const auto end_at = [&](const PoseSearchOptions& options, double tx_mm) {
+    return end_text(PoseSearch(*small.problem, options),
+                    pose_from_parameters(small.problem->frame(),
+                                         PoseParameters::from_deg_and_mm({0, 0, 0, tx_mm, 0, 0})));
+  };
+  PoseSearchOptions options;
+  EXPECT_EQ(end_at(options, 20.0), "tx: ");
+  options.translation_mm = {10.0, 10.0, 10.0};
+  EXPECT_EQ(end_at(options, 10.0), "tx: --search-translation-mm 20,10,10");
+  options.translation_mm = {11.0, 10.0, 10.0};
+  EXPECT_EQ(end_at(options, 11.0), "tx: ");
 }
 
 std::string refusal(const RegistrationProblem& problem, const PoseSearchOptions& options) {
@@ -239,7 +323,8 @@ TEST(PoseSearchOptions, NamesEverythingThatIsWrong) {
   PoseSearchOptions options;
   options.rotation_deg = {10.0, -1.0, 181.0};
   options.translation_mm = {10.0, 10.0, 1001.0};
-  EXPECT_EQ(problems(options).size(), 3u);
+  options.orientations = "upright";
+  EXPECT_EQ(problems(options).size(), 4u);
   options = {};
   options.orientations = "any";
   options.rotation_deg = {10.0, 10.0, 10.0};

@@ -40,6 +40,20 @@ TEST(RotationSet, EveryRotationOfARangeHasOneNearby) {
   }
 }
 
+TEST(RotationSet, KnowsTheOuterCellsOfARange) {
+  // Four, two and nine cells of 10 degrees.
+  const MotionRange range(PoseParameters::from_deg_and_mm({-20, -5, 0, 0, 0, 0}),
+                          PoseParameters::from_deg_and_mm({20, 15, 90, 0, 0, 0}));
+  const auto outer = [&](double x, double y, double z) {
+    return in_outer_cells(range, 10.0 * kRadPerDeg, kRadPerDeg * Eigen::Vector3d(x, y, z))
+        .to_string();  // z, y, x
+  };
+  EXPECT_EQ(outer(9, 14, 79), "000");
+  EXPECT_EQ(outer(11, -4, 81), "101");
+  EXPECT_EQ(outer(-15, 5, 9), "101");
+  EXPECT_EQ(outer(-9, 5, 11), "000");
+}
+
 TEST(RotationSet, EveryRotationHasOneNearby) {
   const double step = 20.0 * kRadPerDeg;
   const std::vector<Eigen::Matrix3d> rotations = all_rotations(step);

@@ -36,6 +36,15 @@ TEST(TranslationLattice, APartEndsWhereTheLatticeEnds) {
   EXPECT_THAT(lattice.nodes(part), ElementsAre(3, 4, 8, 9));
 }
 
+TEST(TranslationLattice, HasEndsWhereThereIsSomethingBetweenThem) {
+  const Steps three(-2.0, 2.0, 2.0);
+  EXPECT_TRUE(three.is_at_end(-2.0));
+  EXPECT_FALSE(three.is_at_end(0.5));
+  EXPECT_TRUE(three.is_at_end(2.0));
+  EXPECT_FALSE(Steps(-1.0, 1.0, 2.0).is_at_end(1.0));
+  EXPECT_FALSE(Steps(7.0, 7.0, 2.0).is_at_end(7.0));
+}
+
 TEST(TranslationLattice, MaximaHaveNoLargerNeighbourAlongAnAxis) {
   const LatticePart part{{0, 0, 0}, {3, 2, 2}};
   const std::vector<float> values{5,
