@@ -10,6 +10,8 @@ if(AF_MPI)
   find_package(MPI REQUIRED COMPONENTS C)
   # The C interface only: mpi.h would otherwise pull in the removed C++ bindings and their library.
   set_property(TARGET MPI::MPI_C APPEND PROPERTY INTERFACE_COMPILE_DEFINITIONS OMPI_SKIP_MPICXX MPICH_SKIP_MPICXX)
+else()
+  add_library(MPI::MPI_C INTERFACE IMPORTED) # of nothing
 endif()
 if(AF_BUILD_TESTS AND NOT AF_BUILD_FUZZERS)
   find_package(GTest REQUIRED)

@@ -3,6 +3,8 @@
 
 #include <system_error>
 
+#include <mpi.h>
+
 #include "base/error.h"
 #include "field/hdf5_calls.h"
 #include "ranks/mpi_group.h"

@@ -18,7 +18,7 @@ import tempfile
 
 WATCHED = {  # header: the library as CMake knows it
     r"mpi\.h$": "MPI::MPI_C",
-    r"(hdf5|H5\w*)\.h$": "PkgConfig::hdf5_openmpi",
+    r"(hdf5|H5\w*)\.h$": "PkgConfig::hdf5",
     r"(itk|vnl)": "${ITK_LIBRARIES}",
     r"gdcm": "gdcmMSFF",
     r"CLI/": "CLI11::CLI11",
@@ -207,7 +207,7 @@ SCRATCH = {
     "common/base/CMakeLists.txt": "af_add_library(\n  af_base\n  SOURCES error.cpp)\n",
     "common/geometry/CMakeLists.txt": "af_add_library(af_geometry SOURCES ray.cpp USES af_base)\n",
     "common/ranks/CMakeLists.txt": "af_add_library(af_ranks SOURCES communicator.cpp USES af_base PRIVATE MPI::MPI_C)\n",
-    "common/field/CMakeLists.txt": "af_add_library(af_field SOURCES f.cpp USES af_ranks PRIVATE MPI::MPI_C PkgConfig::hdf5_openmpi)\n",
+    "common/field/CMakeLists.txt": "af_add_library(af_field SOURCES f.cpp USES af_ranks PRIVATE MPI::MPI_C PkgConfig::hdf5)\n",
     "register/method/CMakeLists.txt": "af_add_library(af_register_method SOURCES registration.cpp USES af_geometry)\n",
     "common/base/error.h": "#include <string>\n",
     "common/geometry/ray.h": '#include "base/error.h"\n',
