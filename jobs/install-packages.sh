@@ -12,7 +12,7 @@ base_packages=(
   libinsighttoolkit5-dev libgdcm-dev libpng-dev libtiff-dev zlib1g-dev
   libeigen3-dev libcli11-dev libtomlplusplus-dev nlohmann-json3-dev libnlopt-dev libspdlog-dev libssl-dev libboost-math-dev
   libgtest-dev libgmock-dev
-  python3-dev python3-numpy pybind11-dev python3-wheel
+  python3-dev python3-numpy pybind11-dev python3-wheel patchelf
   libcairo2-dev fonts-dejavu-core
   python3-h5py python3-jinja2 python3-matplotlib python3-pydicom python3-yaml
   dpkg-dev file
