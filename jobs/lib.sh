@@ -1,6 +1,6 @@
 # shellcheck shell=bash
 # SPDX-License-Identifier: Apache-2.0
-# Shared by the scripts of jobs/, tests/ and .ci/: messages, building, mpirun. Sourced, never run; the caller has set
+# Shared by the scripts of jobs/, tests/ and .ci/: messages, building, ranks. Sourced, never run; the caller has set
 # `set -euo pipefail`.
 
 # The repository (or, installed, the folder that holds jobs/).
@@ -85,25 +85,11 @@ build_preset() {
   fi
 }
 
-# Jobs of Open MPI 4.1 that run side by side share a folder, which is named after the machine without its domain. A job that
-# ends removes an empty folder, even while another job is starting.
-keep_folder_of_mpirun() {
-  local host
-  host=$(uname -n)
-  (umask 077 && mkdir -p "${TMPDIR:-/tmp}/ompi.${host%%.*}.$(id -u)/keep")
-}
-
-# Runs several ranks of a program on this machine. This works as root, with more ranks than cores, and in containers.
+# run_ranks RANKS COMMAND...: the program's ranks on this machine.
 run_ranks() {
   local ranks=$1
   shift
-  if ((ranks == 1)); then
-    "$@"
-    return
-  fi
-  keep_folder_of_mpirun
-  OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 \
-    mpirun -n "$ranks" --oversubscribe --bind-to none "$@"
+  if ((ranks == 1)); then "$@"; else "$@" --processes "$ranks"; fi
 }
 
 # Checks of scripts' options: need_value OPTION ARGUMENTS_LEFT, need_count OPTION VALUE.

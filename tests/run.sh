@@ -52,7 +52,10 @@ say "        $(duration $((SECONDS - build_start)))"
 export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
 # In a chroot without /sys, hwloc complains on standard error of every program, which the tests read.
 export HWLOC_HIDE_ERRORS="${HWLOC_HIDE_ERRORS:-2}"
-keep_folder_of_mpirun
+# Jobs of Open MPI 4.1 that run side by side share a folder, which is named after the machine without its domain. A job that
+# ends removes an empty folder, even while another job is starting.
+machine=$(uname -n)
+(umask 077 && mkdir -p "${TMPDIR:-/tmp}/ompi.${machine%%.*}.$(id -u)/keep")
 # A rank that waits would spin on a processor that another test needs.
 export OMPI_MCA_mpi_yield_when_idle=1
 if [[ "$preset" == sanitize ]]; then
