@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # Does what a user does who starts from nothing. On a bare Debian (debootstrap, variant minbase) it runs the two commands of
-# README.md in a clone of the last commit. On a second bare Debian it then tries the packages of that build. Needs root,
-# debootstrap, git and Debian's mirror.
+# README.md in a clone of the last commit. On a second bare Debian it then tries the packages of that build, on a third one
+# the wheel of a build without MPI. Needs root, debootstrap, git and Debian's mirror.
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
 source "$(dirname "${BASH_SOURCE[0]}")/../../jobs/lib.sh"
@@ -13,10 +13,11 @@ Usage: tests/package/bare_debian.sh bookworm|trixie [--root DIR]
 
 Installs packages as root, and as a plain user runs jobs/local.sh and tests/run.sh and makes the Debian packages. These
 are installed on another bare system, used there (a study from a phantom to a pose, alone and under mpirun) and
-removed. Ends with one line per step, release, commit and date. From nothing it takes about an hour and a half on two
-cores, and 10 GB. Logs are in build/bare-RELEASE.
+removed. A wheel is installed into a virtual environment of a third one, and must find that pose again. Ends with one
+line per step, release, commit and date. From nothing it takes about two hours on two cores, and 12 GB. Logs are in
+build/bare-RELEASE.
 
-  --root DIR    where the two systems are made; those that are there are used again  [a new folder, removed at the end]
+  --root DIR    where the systems are made; those that are there are used again  [a new folder, removed at the end]
   AF_DEBIAN_MIRROR, in the environment: where packages come from                      [http://deb.debian.org/debian]
 TEXT
 }
@@ -51,7 +52,7 @@ if [[ -z "$systems" ]]; then
   systems=$(mktemp -d)
   is_for_once=yes
 fi
-source_system="$systems/source" package_system="$systems/package"
+source_system="$systems/source" package_system="$systems/package" wheel_system="$systems/wheel"
 clone="$source_system/home/guest/attenuation-fields"
 
 # --- steps -------------------------------------------------------------------------------------------------------
@@ -118,6 +119,8 @@ install_what_builds() { ~guest/attenuation-fields/jobs/install-packages.sh; }
 run_study() { cd attenuation-fields && jobs/local.sh; }
 run_tests() { cd attenuation-fields && tests/run.sh; }
 make_packages() { cd attenuation-fields && cmake --build build/release --target package; }
+compare_without_mpi() { cd attenuation-fields && tests/package/without_mpi.sh; }
+make_wheel() { cd attenuation-fields && cmake --build build/serial --target python-wheel; }
 
 install_ours() {
   local program file
@@ -152,6 +155,25 @@ remove_ours() {
   if command -v af-drr; then exit 1; fi
 }
 
+# The virtual environment takes what the wheel declares from Debian, so that nothing comes from elsewhere.
+install_what_wheel_declares() {
+  apt-get update -q
+  apt-get install -y -q --no-install-recommends python3-venv python3-numpy python3-h5py python3-pydicom python3-yaml \
+    python3-jinja2 python3-matplotlib
+}
+use_wheel() {
+  python3 -m venv --system-site-packages environment
+  environment/bin/pip install --no-index /packages/*.whl
+  environment/bin/af-convert --help
+  environment/bin/af-report --help
+  environment/bin/python -c '
+import attenuation_fields as af
+fields = {"AP": "trial/AP.af.h5", "LAT": "trial/LAT.af.h5"}
+found = af.register("trial/study/study.toml", fields=fields, rotation_deg=(1, -1, 1))
+assert (af.read_pose("trial/result/pose.toml") == found.pose).all(), found.pose
+print(found.verdict, found.tre_mm)'
+}
+
 # --- all of it ---------------------------------------------------------------------------------------------------
 
 trap finish EXIT
@@ -162,6 +184,8 @@ step "jobs/local.sh" inside "$source_system" guest run_study || true
 step "tests/run.sh" inside "$source_system" guest run_tests || true
 steps+=("        $(grep 'tests failed out of' "$logs/tests-run.sh.log" || echo "no test was run")")
 step "target package" inside "$source_system" guest make_packages
+step "without MPI" inside "$source_system" guest compare_without_mpi || true
+step "wheel" inside "$source_system" guest make_wheel || true
 
 enter "$package_system"
 rm -rf "$package_system/packages"
@@ -170,3 +194,12 @@ cp "$clone"/build/release/*.deb "$package_system/packages"
 step "our packages: install" inside "$package_system" root install_ours
 step "our packages: use" inside "$package_system" guest use_ours || true
 step "our packages: remove" inside "$package_system" root remove_ours
+
+enter "$wheel_system"
+rm -rf "$wheel_system/packages"
+mkdir "$wheel_system/packages"
+cp "$clone"/build/serial/wheel/*.whl "$wheel_system/packages"
+cp -r "$package_system/home/guest/trial" "$wheel_system/home/guest"
+step "wheel: what it declares" inside "$wheel_system" root install_what_wheel_declares
+step "wheel: use" inside "$wheel_system" guest use_wheel
+steps+=("        $(du -m "$wheel_system"/packages/*.whl | cut -f 1) MB")
