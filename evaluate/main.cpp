@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -47,9 +46,5 @@ int main(int argc, char** argv) {
     for (const af::cli::SubCommand& command : commands)
       if (command.app->parsed()) command.run(command_line, world);
   };
-  return af::cli::app_main(app, argc, argv, run, [&] {
-    return std::ranges::any_of(commands, [](const af::cli::SubCommand& command) {
-      return command.writes_by_mpi && command.app->parsed();
-    });
-  });
+  return af::cli::app_main(app, argc, argv, run);
 }

@@ -15,7 +15,6 @@ struct SubCommand {
   CLI::App* app;
   /// Collective.
   std::function<void(const std::string& command_line, const Communicator& world)> run;
-  bool writes_by_mpi = false;  ///< needs MPI even where no launcher started the program
 };
 
 /// Adds a sub-command without options.

@@ -360,7 +360,6 @@ cli::SubCommand field_parameters_command(CLI::App& app) {
                        "four parameters; builds missing fields",
                        run_field_parameters,
                        options);
-  command.writes_by_mpi = true;  // fields
   cli::bind_run_limits(*command.app);
   return command;
 }
