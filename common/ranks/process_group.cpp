@@ -275,6 +275,7 @@ void LocalProcesses::describe(Fields& field) {
         "Processes on this machine that share the work, without mpirun; results do not depend on "
         "them")
       .within(1, kMostProcesses)
+      .checked_when_typed()
       .not_recorded("results are the same");
 }
 

@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "cli/run_limits.h"
+#include "ranks/process_group.h"
 
 namespace af {
 namespace {
@@ -39,10 +40,14 @@ TEST(StopRequest, LimitsAreChecked) {
                           "--max-hours -1",
                           "--max-hours nan",
                           "--max-hours 2h",
-                          "--stall-minutes -1"})
+                          "--stall-minutes -1",
+                          "--processes 0",
+                          "--processes 257"})
     EXPECT_THROW(app.parse(bad, false), CLI::ParseError) << bad;
   app.parse("--stall-minutes 0", false);
   EXPECT_EQ(run_limits().stall_minutes, 0.0);
+  app.parse("--processes 256", false);
+  EXPECT_EQ(local_processes().count, kMostProcesses);
   EXPECT_FALSE(is_stop_requested());
 }
 
