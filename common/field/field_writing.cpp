@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <iterator>
+#include <optional>
 #include <span>
 #include <tuple>
 #include <utility>
@@ -200,32 +202,37 @@ class SharedFile {
     });
   }
 
+  /// Rank 0 gets one block at a time: no rank has room for the blocks of all.
   void write_on_root(std::size_t slab, std::span<IndexBlock* const> mine, std::size_t most) {
-    for (std::size_t i = 0; i < most; ++i) {
-      std::vector<IndexBlock> next;
-      if (i < mine.size()) next.push_back(std::move(*mine[i]));
-      const std::vector<IndexBlock> of_all = at_root(std::move(next));
-      if (!communicator_.is_root()) continue;
-      naming_file(path_, [&] {
-        const hdf5::StoredTiles tiles(file_, rules_[slab], path_.string());
-        for (const IndexBlock& block : of_all) {
-          const DatasetBlock values = in_dataset(block, rules_[slab]);
-          tiles.write(&values, block.indices, hdf5::Writers::OneRank);
-        }
-      });
-    }
+    std::optional<hdf5::StoredTiles> tiles;
+    const auto if_root = [&](const std::function<void()>& action) {
+      if (communicator_.is_root()) naming_file(path_, action);
+    };
+    if_root([&] { tiles.emplace(file_, rules_[slab], path_.string()); });
+    for (std::size_t i = 0; i < most; ++i)
+      for (int rank = 0; rank < communicator_.size(); ++rank) {
+        std::vector<IndexBlock> next;
+        if (rank == communicator_.rank() && i < mine.size()) next.push_back(std::move(*mine[i]));
+        const std::vector<IndexBlock> blocks = at_root(rank, std::move(next));
+        if_root([&] {
+          for (const IndexBlock& block : blocks) {
+            const DatasetBlock values = in_dataset(block, rules_[slab]);
+            tiles->write(&values, block.indices, hdf5::Writers::OneRank);
+          }
+        });
+      }
+    if_root([&] { tiles->close(); });
   }
 
-  /// Collective. The blocks of all ranks on rank 0.
-  [[nodiscard]] std::vector<IndexBlock> at_root(std::vector<IndexBlock> mine) const {
-    if (communicator_.size() == 1) return mine;
-    const auto of_ranks = communicator_.all_gather(bytes_of(mine));
+  /// Collective. What `rank` gives, on rank 0.
+  [[nodiscard]] std::vector<IndexBlock> at_root(int rank, std::vector<IndexBlock> blocks) const {
+    if (rank == 0) return blocks;
+    const bool is_sender = communicator_.rank() == rank;
+    const auto of_ranks =
+        communicator_.all_gather(is_sender ? bytes_of(blocks) : std::vector<std::byte>());
     if (!communicator_.is_root()) return {};
-    std::vector<IndexBlock> all;
-    for (const std::vector<std::byte>& bytes : of_ranks)
-      for (auto& block : value_of<std::vector<IndexBlock>>(bytes, "index blocks of a rank"))
-        all.push_back(std::move(block));
-    return all;
+    return value_of<std::vector<IndexBlock>>(of_ranks[static_cast<std::size_t>(rank)],
+                                             "index blocks of a rank");
   }
 
   const std::filesystem::path& path_;

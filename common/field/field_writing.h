@@ -56,7 +56,7 @@ using MpiIoHints = std::vector<std::pair<std::string, std::string>>;
 /// rank need hold more than one round's. Ranks without a block take part. Returns the same info on
 /// every rank.
 /// After a failed write, MPI-IO and HDF5 can be neither used nor finalised. The ranks that know of
-/// the failure throw, alone, and MpiEnvironment::is_abort_required() is true.
+/// the failure throw, alone, and is_abort_required() is true.
 FieldFileInfo write_field(const CompressedAttenuationField& field,
                           const NextBlocks& next_blocks,
                           const MakeProvenance& make_provenance,

@@ -243,4 +243,9 @@ void StoredTiles::write(const DatasetBlock* block,
   hdf5::write(*means_, &of_means, means, writers);
 }
 
+void StoredTiles::close() {
+  codewords_.close("H5Dclose");
+  if (means_) means_->close("H5Dclose");
+}
+
 }  // namespace af::hdf5

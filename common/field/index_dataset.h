@@ -62,6 +62,9 @@ class StoredTiles {
   void write(const DatasetBlock* block,
              std::span<const std::uint16_t> values,
              Writers writers) const;
+  /// Ends the writing of one rank. HDF5 keeps what one rank wrote until here, and says only here
+  /// that it could not be stored.
+  void close();
 
  private:
   field_layout::DatasetRule rule_;

@@ -252,6 +252,20 @@ TEST_F(Faults, AFullDiskEndsAllProcesses) {
   expect_going_on();
 }
 
+TEST_F(Faults, AFullDiskWhileTheFirstProcessWritesTheFieldEndsAll) {
+  constexpr std::uint64_t kMoreThanTheDeflatedCodebook = 400'000;
+  std::vector<std::string> command = {"prlimit",
+                                      "--fsize=" + std::to_string(kMoreThanTheDeflatedCodebook)};
+  for (const std::string& word : by_processes({"--no-checkpoint"})) command.push_back(word);
+  test::LaunchedJob job(command, output());
+  EXPECT_EQ(job.wait(kEndsWithin), 4) << said();
+  EXPECT_THAT(said(),
+              ContainsRegex("rank 0 on .*: writing round 1 of the indices: .*(H5Dwrite|H5Dclose) "
+                            "failed"));
+  EXPECT_FALSE(fs::exists(field()));
+  expect_going_on();
+}
+
 TEST_F(Faults, RanksOfALauncherAreNotMultiplied) {
   const test::ProgramRun run = test::run_command(words(precompute(2, {"--processes", "2"})));
   EXPECT_EQ(run.exit_code, 2) << run.output;
