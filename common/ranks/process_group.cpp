@@ -236,6 +236,8 @@ class ProcessGroup::Watch {
 ProcessGroup::ProcessGroup(int count, std::function<void(const std::string& text)> on_loss) {
   if (count <= 1) return;
   Board& board = shared_board();
+  // A parent may have had it ignored. Then nobody learns how a process ended.
+  std::signal(SIGCHLD, SIG_DFL);
   std::fflush(nullptr);
   std::cout.flush();
   const pid_t first = ::getpid();

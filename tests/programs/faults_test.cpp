@@ -223,6 +223,18 @@ TEST_F(Faults, AKilledProcessIsNamedAndTheJobEnded) {
   expect_going_on();
 }
 
+TEST_F(Faults, AKilledProcessIsNoticedWhereEndsOfProcessesWereIgnored) {
+  std::vector<std::string> command = {"env", "--ignore-signal=CHLD"};
+  for (const std::string& word : by_processes()) command.push_back(word);
+  test::LaunchedJob job(command, output());
+  ASSERT_TRUE(job.wait_until([] { return unit_bytes() > 0; })) << said();
+  ASSERT_FALSE(job.ranks().empty());
+  kill(job.ranks().back(), SIGKILL);
+  EXPECT_EQ(job.wait(kEndsWithin), 75) << said();
+  EXPECT_THAT(said(), HasSubstr("was ended by signal 9 (Killed)"));
+  expect_going_on();
+}
+
 TEST_F(Faults, ProcessesEndWithTheFirst) {
   test::LaunchedJob job(by_processes(), output());
   ASSERT_TRUE(job.wait_until([] { return unit_bytes() > 0; })) << said();
