@@ -134,7 +134,10 @@ class SharingProcesses : public RankGroup {
 
   [[noreturn]] void abort(int exit_code) override {
     board_.abort_code = exit_code;  // rank 0's Watch sees it
-    if (rank_ == 0) kill_others(SIGKILL);
+    if (rank_ == 0)
+      kill_others(SIGKILL);
+    else
+      ::kill(::getppid(), SIGCONT);  // it may be what the job is ended for: stopped
     std::_Exit(exit_code);
   }
 

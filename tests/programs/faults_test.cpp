@@ -243,6 +243,16 @@ TEST_F(Faults, ProcessesEndWithTheFirst) {
   expect_going_on();
 }
 
+TEST_F(Faults, AStoppedFirstProcessIsNamedAndTheJobEnded) {
+  test::LaunchedJob job(by_processes({"--stall-minutes", "0.15"}), output());
+  ASSERT_TRUE(job.wait_until([] { return unit_bytes() > 0; })) << said();
+  kill(job.launcher(), SIGSTOP);
+  EXPECT_EQ(job.wait(kEndsWithin), 75) << said();
+  EXPECT_THAT(said(), ContainsRegex("rank 0 on .*: (no progress|is stopped: has not run) for"));
+  EXPECT_EQ(count_of("(--stall-minutes): the job is ended", said()), 1u);
+  expect_going_on();
+}
+
 TEST_F(Faults, ASignalToTheFirstProcessStopsAll) {
   test::LaunchedJob job(by_processes(), output());
   ASSERT_TRUE(job.wait_until([] { return unit_bytes() > 0; })) << said();
