@@ -223,6 +223,8 @@ class ProcessGroup::Watch {
       if (errno != EINTR) return;
     const int abort_code = board_.abort_code;
     if (abort_code == kNotAborted && (found.si_pid == 0 || found.si_code == CLD_EXITED)) return;
+    // The destructor looks as well. What the first loss ends is no loss of its own.
+    if (is_lost_.exchange(true)) return;
     kill_others(SIGKILL);
     if (abort_code != kNotAborted) std::_Exit(abort_code);
     on_loss_("rank " + std::to_string(rank) + " (process " + std::to_string(process) +
@@ -233,6 +235,7 @@ class ProcessGroup::Watch {
   Board& board_;
   int size_;
   std::function<void(const std::string&)> on_loss_;
+  std::atomic<bool> is_lost_ = false;
   std::jthread thread_;
 };
 
