@@ -182,7 +182,13 @@ int app_main(CLI::App& app,
                     "--processes shares the work of a program without a launcher: leave it out");
     if (is_launched()) environment.emplace(argc, argv);
     refuse_if_any(app, split_job_problem(Communicator::world().size()));
-    processes.emplace(process_count, [&app](const std::string& loss) { end_job(app, loss); });
+    try {
+      processes.emplace(process_count, [&app](const std::string& loss) { end_job(app, loss); });
+    } catch (const std::system_error& error) {
+      std::cerr << app.get_name() << ": --processes " << process_count << ": " << error.what()
+                << std::endl;
+      std::_Exit(static_cast<int>(ExitCode::Internal));
+    }
     return Communicator::world();
   };
   app.name(program_name(argv[0]));
@@ -199,13 +205,6 @@ int app_main(CLI::App& app,
   const Communicator world = join_job(local_processes().count);
   std::optional<StallWatch> watch;
   const double stall_minutes = run_limits().stall_minutes;
-  if (stall_minutes > 0.0) {
-    if (world.size() > 1) alarm.emplace(stall_minutes, [&app] { end_alone(app, "it begins"); });
-    watch.emplace(world, stall_minutes, [&app](const std::string& stall) {
-      end_job(app, stall + " (--stall-minutes)");
-    });
-    alarm.reset();
-  }
   const OnLeaving begin_to_end([&] {
     if (watch.has_value() && world.size() > 1)
       alarm.emplace(stall_minutes, [&app] { end_alone(app, "it ends"); });
@@ -213,6 +212,13 @@ int app_main(CLI::App& app,
   RankFailure failure;
   bool is_known_everywhere = false;
   try {
+    if (stall_minutes > 0.0) {
+      if (world.size() > 1) alarm.emplace(stall_minutes, [&app] { end_alone(app, "it begins"); });
+      watch.emplace(world, stall_minutes, [&app](const std::string& stall) {
+        end_job(app, stall + " (--stall-minutes)");
+      });
+      alarm.reset();
+    }
     if (environment) environment->require_threads();
     run(world);
     return with_output_written(app, static_cast<int>(ExitCode::Done));
