@@ -12,7 +12,7 @@ int main(int argc, char** argv) {
   af::PrecomputeOptions options;
   CLI::App app{
       "Makes an attenuation field: all line integrals through a CT that one camera can see while "
-      "the CT moves within a range. It runs alone, as --processes or under mpirun, with the same "
+      "the CT moves within a range. It runs alone, with --processes or under mpirun, with the same "
       "result; stopped, "
       "the same command continues."};
   af::cli::bind_options(app, options);
