@@ -73,6 +73,9 @@ class Faults : public testing::Test {
     return nlohmann::json::parse(run.output)[0]["facts"]["payload_sha256"];
   }
 
+  /// Whether the field is the one that ranks of MPI have made.
+  static bool is_right() { return payload() == payload_; }
+
   static fs::path output() { return *folder_ / "output.txt"; }
   static std::string said() { return read_text_file(output()); }
 
@@ -207,7 +210,7 @@ TEST_F(Faults, AFullDiskWhileTheFieldIsWrittenEndsTheJobAtOnce) {
 TEST_F(Faults, ProcessesMakeTheFieldThatRanksMake) {
   const test::ProgramRun run = test::run_command(words(by_processes()));
   EXPECT_EQ(run.exit_code, 0) << run.output;
-  EXPECT_EQ(payload(), payload_);
+  EXPECT_TRUE(is_right());
 }
 
 TEST_F(Faults, AKilledProcessIsNamedAndTheJobEnded) {
