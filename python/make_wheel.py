@@ -13,6 +13,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 
 METADATA = """Metadata-Version: 2.1
@@ -60,13 +61,17 @@ def needed_by(file: Path) -> dict[str, Path]:
     return found
 
 
-def packaged_as(library: Path) -> str:
-    """The Debian package of a library, or "" for one that was put there by hand."""
-    for path in (library, Path("/usr" + str(library)), library.resolve()):
-        asked = subprocess.run(["dpkg", "-S", str(path)], capture_output=True, text=True)
-        if asked.returncode == 0:
-            return asked.stdout.split(":")[0].split(",")[0]
-    return ""
+def packages_of(libraries: Iterable[Path]) -> dict[Path, str]:
+    """The Debian package of each library that is not put there by hand. dpkg knows some of them by their name in /lib, others
+    by that in /usr/lib, or by what a link leads to."""
+    names = {path: library for library in libraries for path in (f"/usr{library}", str(library), str(library.resolve()))}
+    asked = subprocess.run(["dpkg", "-S", *names], capture_output=True, text=True)  # fails for the names it does not know
+    found = {}
+    for line in asked.stdout.splitlines():
+        packages, path = line.split(": ", 1)
+        if path in names:
+            found[names[path]] = packages.split(",")[0].split(":")[0]
+    return found
 
 
 def carry_libraries(binaries: list[Path], folder: Path, licences: Path) -> None:
@@ -77,12 +82,13 @@ def carry_libraries(binaries: list[Path], folder: Path, licences: Path) -> None:
         needed |= needed_by(binary)
     folder.mkdir()
     licences.mkdir()
+    packages = packages_of(needed.values())
     new_names = {}
     for name, library in sorted(needed.items()):
         stem, rest = name.split(".so", 1)
         new_names[name] = f"{stem}-{hashlib.sha256(library.read_bytes()).hexdigest()[:8]}.so{rest}"
         shutil.copy(library, folder / new_names[name])
-        if package := packaged_as(library):
+        if package := packages.get(library):
             shutil.copy(f"/usr/share/doc/{package}/copyright", licences / package)
         else:
             print(f"make_wheel.py: {library} belongs to no Debian package; its licence is not listed", file=sys.stderr)
@@ -91,8 +97,12 @@ def carry_libraries(binaries: list[Path], folder: Path, licences: Path) -> None:
         renames = [word for old in sorted(wanted & new_names.keys()) for word in ("--replace-needed", old, new_names[old])]
         is_ours = file in binaries
         path = f"$ORIGIN:$ORIGIN/../{folder.name}" if is_ours else "$ORIGIN"
-        soname = [] if is_ours else ["--set-soname", file.name]
-        output_of("patchelf", *renames, *soname, "--force-rpath", "--set-rpath", path, file)
+        # In one call, patchelf 0.14 mixes the new texts up.
+        if renames:
+            output_of("patchelf", *renames, file)
+        if not is_ours:
+            output_of("patchelf", "--set-soname", file.name, file)
+        output_of("patchelf", "--force-rpath", "--set-rpath", path, file)
 
 
 def newest_libc(files: list[Path]) -> tuple[int, int]:
