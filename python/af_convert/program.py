@@ -5,6 +5,7 @@ import math
 import os
 import pathlib
 import re
+import resource
 import sys
 
 from af_programs.argument_pages import add_common_options
@@ -87,6 +88,8 @@ def parser():
 
 def main(arguments=None):
     options = parser().parse_args(arguments)
+    # Files are not trusted, and none of them needs more memory than this.
+    resource.setrlimit(resource.RLIMIT_DATA, (4 << 30, resource.getrlimit(resource.RLIMIT_DATA)[1]))
     try:
         notes, outputs = converted(options)
         for note in notes:
