@@ -33,7 +33,7 @@ cmake --build "$serial" --parallel "$(build_job_count)" \
   --target "${programs[@]/#/af-}" attenuation_fields python-module "${tests[@]}" >>"$work/log" || { tail -n 40 "$work/log"; exit 1; }
 
 say "libraries"
-for file in "$serial"/bin/af-* "$serial"/lib/libattenuation_fields.so "$serial"/python/attenuation_fields/_core*.so; do
+for file in "${programs[@]/#/$serial/bin/af-}" "$serial"/lib/libattenuation_fields.so "$serial"/python/attenuation_fields/_core*.so; do
   mapped=$(ldd "$file")
   [[ "$mapped" != *libmpi* && "$mapped" != *openmpi* ]] || die 1 "$file maps MPI: $mapped"
   [[ "$mapped" != *'not found'* ]] || die 1 "$file: $mapped"
@@ -50,12 +50,12 @@ done
 
 say "bits"
 cd "$work"
-"$release/bin/af-simulate" --phantom spine --phantom-voxel-mm 2 --rig c-arm-12in -o study >/dev/null
+"$release/bin/af-simulate" --phantom spine --phantom-voxel-mm 2 --rig c-arm-12in -o study >"$work/log" 2>&1
 # field OUTPUT WORDS...: the payload's hash of a field that these words make.
 field() {
   "${@:2}" --study study/study.toml --camera AP --uv-nodes 12 --st-nodes 96 --codewords 256 -o "$1" >"$1.log" 2>&1 ||
     { cat "$1.log" >&2; return 1; }
-  "$release/bin/af-inspect" --json "$1" | python3 -c 'import json, sys; print(json.load(sys.stdin)[0]["facts"]["payload_sha256"])'
+  "$release/bin/af-inspect" --json "$1" | /usr/bin/python3 -c 'import json, sys; print(json.load(sys.stdin)[0]["facts"]["payload_sha256"])'
 }
 export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
 expected=$(field mpi.h5 mpirun -n 2 --oversubscribe "$release/bin/af-precompute")
@@ -64,8 +64,9 @@ for processes in 1 3; do
   [[ "$found" == "$expected" ]] || die 1 "the field of $processes processes has hash $found, the one of MPI $expected"
 done
 for build in "$release" "$serial"; do
-  "$build/bin/af-register" --study study/study.toml --renderer raycast --start-rotation-deg 1,-1,1 -o "$(basename "$build")" >/dev/null
-  PYTHONPATH="$build/python" python3 -c 'import sys, attenuation_fields as af
+  "$build/bin/af-register" --study study/study.toml --renderer raycast --start-rotation-deg 1,-1,1 -o "$(basename "$build")" \
+    >"$work/log" 2>&1
+  PYTHONPATH="$build/python" /usr/bin/python3 -c 'import sys, attenuation_fields as af
 sys.stdout.buffer.write(af.Field.open("mpi.h5").drr(rotation_deg=(1, 0, 0)).tobytes())' >"$(basename "$build").drr"
 done
 cmp release/pose.toml serial/pose.toml
