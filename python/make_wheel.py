@@ -23,11 +23,12 @@ Summary: 2D-3D registration with attenuation fields
 License: Apache-2.0
 Requires-Python: =={python}.*
 Requires-Dist: {numpy}
-Requires-Dist: h5py
-Requires-Dist: pydicom
-Requires-Dist: PyYAML
-Requires-Dist: Jinja2
-Requires-Dist: matplotlib
+Provides-Extra: programs
+Requires-Dist: h5py; extra == "programs"
+Requires-Dist: pydicom; extra == "programs"
+Requires-Dist: PyYAML; extra == "programs"
+Requires-Dist: Jinja2; extra == "programs"
+Requires-Dist: matplotlib; extra == "programs"
 """
 
 WHEEL = """Wheel-Version: 1.0
@@ -37,8 +38,8 @@ Tag: {tag}
 """
 
 ENTRY_POINTS = """[console_scripts]
-af-convert = af_convert.program:main
-af-report = af_report.program:main
+af-convert = af_programs.of_wheel:convert
+af-report = af_programs.of_wheel:report
 """
 
 # What every system has, and what must be the same for all of a process.

@@ -31,3 +31,11 @@ assert any("libattenuation_fields" in name for name in carried), maps
 assert not {name for name in maps - carried if re.search("hdf5|ITK|gdcm|nlopt", name)}, maps
 print("test_wheel: the DRR of the wheel is that of af-drr")
 ' "$study"
+"$python" -B -I -c '
+import sys
+sys.path.insert(0, ".")
+sys.modules["pydicom"] = None
+from af_programs.of_wheel import convert
+sys.exit(convert())
+' 2>"$scratch/said" && { echo "test_wheel: af-convert starts without pydicom" >&2; exit 1; }
+grep -q "^af-convert: needs the Python module pydicom: pip install" "$scratch/said" || { cat "$scratch/said" >&2; exit 1; }
