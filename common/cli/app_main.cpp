@@ -179,7 +179,8 @@ int app_main(CLI::App& app,
     refuse_if_any(app, lone_task_problem());
     if (is_launched() && process_count > 1)
       refuse_if_any(app,
-                    "--processes shares the work of a program without a launcher: leave it out");
+                    "--processes is for a program without a launcher: leave it out, or start the "
+                    "program without mpirun (with srun: --mpi=none)");
     if (is_launched()) environment.emplace(argc, argv);
     refuse_if_any(app, split_job_problem(Communicator::world().size()));
     try {
