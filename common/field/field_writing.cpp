@@ -190,14 +190,14 @@ class SharedFile {
  private:
   void write_together(std::size_t slab, std::span<IndexBlock* const> mine, std::size_t most) {
     naming_file(path_, [&] {
-      const hdf5::StoredTiles tiles(file_, rules_[slab], path_.string());
+      const hdf5::StoredTiles tiles(file_, rules_[slab], path_.string(), hdf5::Writers::AllRanks);
       for (std::size_t i = 0; i < most; ++i) {
         if (i >= mine.size()) {
-          tiles.write(nullptr, {}, hdf5::Writers::AllRanks);
+          tiles.write(nullptr, {});
           continue;
         }
         const DatasetBlock block = in_dataset(*mine[i], rules_[slab]);
-        tiles.write(&block, std::exchange(mine[i]->indices, {}), hdf5::Writers::AllRanks);
+        tiles.write(&block, std::exchange(mine[i]->indices, {}));
       }
     });
   }
@@ -217,7 +217,7 @@ class SharedFile {
         if_root([&] {
           for (const IndexBlock& block : blocks) {
             const DatasetBlock values = in_dataset(block, rules_[slab]);
-            tiles->write(&values, block.indices, hdf5::Writers::OneRank);
+            tiles->write(&values, block.indices);
           }
         });
       }

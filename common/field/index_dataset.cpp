@@ -99,23 +99,6 @@ void read(hid_t dataset, const DatasetBlock& block, std::span<std::uint16_t> val
           "H5Dread");
 }
 
-void write(hid_t dataset,
-           const DatasetBlock* block,
-           std::span<const std::uint16_t> values,
-           Writers writers) {
-  const Selection selected(dataset, block);
-  const Handle transfer(H5Pcreate(H5P_DATASET_XFER), H5Pclose, "H5Pcreate");
-  if (writers == Writers::AllRanks) write_collectively(transfer);
-  const std::uint16_t nothing = 0;
-  checked(H5Dwrite(dataset,
-                   H5T_NATIVE_UINT16,
-                   selected.in_memory,
-                   selected.in_file,
-                   transfer,
-                   block == nullptr ? &nothing : values.data()),
-          "H5Dwrite");
-}
-
 /// The rows of codewords of a block, and of means, as codewords_rule() and means_rule() have them.
 DatasetBlock codewords_of(const DatasetBlock& rows) {
   DatasetBlock block = rows;
@@ -187,8 +170,11 @@ void state_sha256(hid_t file, const std::string& group, const std::string& sha25
   replace_text_attribute(object, kSha256Attribute, sha256);
 }
 
-StoredTiles::StoredTiles(hid_t file, const DatasetRule& rule, const std::string& path)
-    : rule_(rule), codewords_(open_dataset(file, codewords_rule(rule), path)) {
+StoredTiles::StoredTiles(hid_t file,
+                         const DatasetRule& rule,
+                         const std::string& path,
+                         Writers writers)
+    : rule_(rule), writers_(writers), codewords_(open_dataset(file, codewords_rule(rule), path)) {
   if (rule.rows_per_tile > 1) means_.emplace(open_dataset(file, means_rule(rule), path));
 }
 
@@ -217,13 +203,27 @@ void StoredTiles::read_planes(
   }
 }
 
-void StoredTiles::write(const DatasetBlock* block,
-                        std::span<const std::uint16_t> values,
-                        Writers writers) const {
-  if (!means_) return hdf5::write(codewords_, block, values, writers);
+void StoredTiles::write_to(hid_t dataset,
+                           const DatasetBlock* block,
+                           std::span<const std::uint16_t> values) const {
+  const Selection selected(dataset, block);
+  const Handle transfer(H5Pcreate(H5P_DATASET_XFER), H5Pclose, "H5Pcreate");
+  if (writers_ == Writers::AllRanks) write_collectively(transfer);
+  const std::uint16_t nothing = 0;
+  checked(H5Dwrite(dataset,
+                   H5T_NATIVE_UINT16,
+                   selected.in_memory,
+                   selected.in_file,
+                   transfer,
+                   block == nullptr ? &nothing : values.data()),
+          "H5Dwrite");
+}
+
+void StoredTiles::write(const DatasetBlock* block, std::span<const std::uint16_t> values) const {
+  if (!means_) return write_to(codewords_, block, values);
   if (block == nullptr) {
-    hdf5::write(codewords_, nullptr, {}, writers);
-    return hdf5::write(*means_, nullptr, {}, writers);
+    write_to(codewords_, nullptr, {});
+    return write_to(*means_, nullptr, {});
   }
   check(block->first[3] % kMeanRunTiles == 0, "a block begins where differences of means do");
   std::vector<std::uint16_t> codewords;
@@ -238,9 +238,9 @@ void StoredTiles::write(const DatasetBlock* block,
     }
   });
   const DatasetBlock of_codewords = codewords_of(*block);
-  hdf5::write(codewords_, &of_codewords, codewords, writers);
+  write_to(codewords_, &of_codewords, codewords);
   const DatasetBlock of_means = means_of(*block);
-  hdf5::write(*means_, &of_means, means, writers);
+  write_to(*means_, &of_means, means);
 }
 
 void StoredTiles::close() {

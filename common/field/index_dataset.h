@@ -46,7 +46,10 @@ enum class Writers { OneRank, AllRanks };
 class StoredTiles {
  public:
   /// Throws FileError when they do not fit the rule.
-  StoredTiles(hid_t file, const field_layout::DatasetRule& rule, const std::string& path);
+  StoredTiles(hid_t file,
+              const field_layout::DatasetRule& rule,
+              const std::string& path,
+              Writers writers = Writers::OneRank);
 
   /// Reads the planes [u] in order, as many at once as chunks span, into the memory that
   /// `planes_of(u, count)` returns, and calls `done(u, planes)`.
@@ -56,18 +59,21 @@ class StoredTiles {
       const std::function<void(std::uint64_t u, std::span<const std::uint16_t> planes)>& done)
       const;
 
-  /// Collective, unless one rank alone has the file open. Writes a block's values, or none where
+  /// Collective for Writers::AllRanks. Writes a block's values, or none where
   /// `block` is null. Where tiles have means, the block begins along t at a multiple of
   /// kMeanRunTiles.
-  void write(const DatasetBlock* block,
-             std::span<const std::uint16_t> values,
-             Writers writers) const;
+  void write(const DatasetBlock* block, std::span<const std::uint16_t> values) const;
   /// Ends the writing of one rank. HDF5 keeps what one rank wrote until here, and says only here
   /// that it could not be stored.
   void close();
 
  private:
+  void write_to(hid_t dataset,
+                const DatasetBlock* block,
+                std::span<const std::uint16_t> values) const;
+
   field_layout::DatasetRule rule_;
+  Writers writers_;
   Handle codewords_;
   std::optional<Handle> means_;  ///< where tiles have them
 };

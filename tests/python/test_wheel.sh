@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # Packs the wheel, installs it into an empty folder and looks a DRR up with it there. Usage: test_wheel.sh CMAKE BUILD PYTHON
-# STUDY. Exit code 77: python3-wheel or pip is not installed.
+# STUDY. Exit code 77: python3-wheel or patchelf is not installed.
 set -euo pipefail
 cmake=$1 build=$2 python=$3 study=$4
 "$python" -c 'import wheel' 2>/dev/null || { echo "skipped: python3-wheel is not installed"; exit 77; }
+command -v patchelf >/dev/null || { echo "skipped: patchelf is not installed"; exit 77; }
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch" || true' EXIT
 "$cmake" --build "$build" --target python-wheel >"$scratch/log" || { cat "$scratch/log" >&2; exit 1; }
