@@ -7,7 +7,7 @@ set -euo pipefail
 # Compilers and build tools, libraries, the Python module, figures, what checks pages and makes packages, and the default CT
 # (invesalius-examples).
 base_packages=(
-  g++-12 cmake ninja-build pkg-config
+  g++ cmake ninja-build pkg-config
   libopenmpi-dev openmpi-bin libhdf5-openmpi-dev
   libinsighttoolkit5-dev libgdcm-dev libpng-dev libtiff-dev zlib1g-dev
   libeigen3-dev libcli11-dev libtomlplusplus-dev nlohmann-json3-dev libnlopt-dev libspdlog-dev libssl-dev libboost-math-dev

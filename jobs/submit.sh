@@ -124,14 +124,17 @@ lines() {
 
 # jobs_of_output: the jobs of this folder that Slurm still has.
 jobs_of_output() {
-  [[ ! -f "$output/jobs/submitted" ]] || squeue --me --noheader --format %F | sort -u | grep -Fx -f <(cut -d ' ' -f 1 "$output/jobs/submitted") || true
+  [[ -f "$output/jobs/submitted" ]] || return 0
+  local jobs
+  jobs=$(squeue --me --noheader --format %F) || die 1 "squeue does not say what is queued (see above), so an earlier chain may still run"
+  sort -u <<<"$jobs" | grep -Fx -f <(cut -d ' ' -f 1 "$output/jobs/submitted") || true
 }
 
 output=$(realpath -m "$output")
 if [[ "$dry_run" == no ]]; then
   mkdir -p "$output"/{fields,registration,logs,jobs,.stages}
-  queued=$(jobs_of_output | paste -sd ' ')
-  [[ -z "$queued" ]] || die 3 "$output: an earlier chain is still in the queue: wait for it, or: scancel $queued"
+  queued=$(jobs_of_output)
+  [[ -z "$queued" ]] || die 3 "$output: an earlier chain is still in the queue: wait for it, or: scancel ${queued//$'\n'/ }"
   rm -f "$output"/.stages/*.fruitless "$output/jobs/submitted"
   [[ "$restart" == no ]] || forget_progress
   cp "$resources" "$output/jobs/resources.sh"

@@ -231,6 +231,17 @@ std::string memory_text(const DryRun& run, const FieldForecast& need) {
   return text;
 }
 
+/// What registrations by this field hold of it when they have looked at all of it: its samples if
+/// they decode them, and those of the levels of half, a quarter, ... of its nodes along s and t.
+std::string opened_text(const DryRun& run, const FieldForecast& need) {
+  const FieldDesign design = run.field.options.design();
+  const bool is_decoded =
+      design.filters_tiles || run.field.parts.front().light_slab.slabs.size() > 1;
+  return "  when opened        up to " +
+         megabytes_text((is_decoded ? need.cropped_bytes : 0) + need.cropped_bytes / 3) +
+         " of samples, once per node for all its ranks; only those that DRRs look at are made\n";
+}
+
 FieldForecast forecast(const DryRun& run) {
   const TileCounts tiles(run);
   const double codebook_bytes = 32.0 * run.field.options.design().codewords;
@@ -275,6 +286,7 @@ std::string dry_run_text(const DryRun& run) {
           formatted(" (1 : %.1f of uncropped, 1 : %.1f of cropped)\n",
                     ratio(need.uncropped_bytes, need.file_bytes),
                     ratio(need.cropped_bytes, need.file_bytes));
+  text += opened_text(run, need);
   text +=
       formatted("  time               about %.1f s (%s; %.1f million rays per second and rank)\n",
                 need.all_seconds(),

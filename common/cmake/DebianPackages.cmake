@@ -19,7 +19,7 @@ set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PROGRAMS_PACKAGE_NAME attenuation-fields)
 set(af_launcher_package "")
 if(AF_MPI)
-  set(af_launcher_package "openmpi-bin, ")
+  string(REPLACE openmpi openmpi-bin af_launcher_package "${af_mpi_name}, ") # mpich is a package, too
 endif()
 set(CPACK_DEBIAN_PROGRAMS_PACKAGE_DEPENDS "${af_launcher_package}python3, python3-h5py, python3-jinja2, python3-matplotlib, python3-numpy, python3-pydicom, python3-yaml")
 set(CPACK_DEBIAN_PROGRAMS_PACKAGE_SUGGESTS invesalius-examples)

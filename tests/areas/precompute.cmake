@@ -29,13 +29,13 @@ af_add_mpi_test(field_build_test SOURCES mpi/field_build_test.cpp LIBS af_precom
 
 foreach(section refusals spacing ranks budget memory corrections stops)
   add_test(NAME precompute_program.${section}
-           COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/programs/precompute_program.sh $<TARGET_FILE:af-precompute> ${MPIEXEC_EXECUTABLE}
+           COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/programs/precompute_program.sh $<TARGET_FILE:af-precompute> ${af_mpiexec}
                    ${section} ${af_sanitized})
   set_tests_properties(precompute_program.${section} PROPERTIES LABELS mpi TIMEOUT 600)
 endforeach()
 
 add_test(NAME atlas_program COMMAND ${PROJECT_SOURCE_DIR}/tests/programs/atlas_program.sh
-                                    ${PROJECT_BINARY_DIR}/bin ${MPIEXEC_EXECUTABLE})
+                                    ${PROJECT_BINARY_DIR}/bin ${af_mpiexec})
 set_tests_properties(atlas_program PROPERTIES LABELS mpi TIMEOUT 900)
 
 af_add_program_tests(

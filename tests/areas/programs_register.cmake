@@ -9,9 +9,7 @@ af_add_program_tests(
 foreach(af_bones simulated wrist)
   add_test(NAME bones.${af_bones} COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/programs/bones.py ${af_bones}
                                           $<TARGET_FILE_DIR:af-register>)
-  set_tests_properties(
-    bones.${af_bones} PROPERTIES LABELS programs SKIP_RETURN_CODE 77 TIMEOUT 600 ENVIRONMENT
-                                 "OMPI_ALLOW_RUN_AS_ROOT=1;OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1")
+  set_tests_properties(bones.${af_bones} PROPERTIES LABELS programs SKIP_RETURN_CODE 77 TIMEOUT 600)
 endforeach()
 
 af_add_program_tests(

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Ten thousand damaged files of every format. Each is converted, or refused as input or as a file, without much time or
-memory. The seed is fixed, so a failure comes again."""
+"""Damaged files of every format. Each is converted, or refused as input or as a file, without much time or memory. The
+seed is fixed, so a failure comes again. CTest runs the first two thousand: test_mutations.py [COUNT]."""
 import collections
 import pathlib
 import random

@@ -8,7 +8,6 @@ bin=$1
 make_inputs=$2
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_hwloc_base_binding_policy=none
 "$make_inputs" "$work"
 cd "$work"
 mkdir out

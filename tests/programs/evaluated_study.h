@@ -24,9 +24,6 @@ class EvaluatedStudy : public testing::Test {
  protected:
   /// The study, its fields and what `prepare_more` adds are made once for all tests.
   static void set_up(const std::function<void()>& prepare_more) {
-    setenv("OMPI_ALLOW_RUN_AS_ROOT", "1", 1);
-    setenv("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1", 1);
-    setenv("OMPI_MCA_hwloc_base_binding_policy", "none", 1);
     folder_ = new ScratchFolder();
     prepare_once(folder_->path(), [&] {
       write_small_study(folder_->path());
@@ -51,17 +48,13 @@ class EvaluatedStudy : public testing::Test {
   }
   static ProgramRun evaluate(const std::string& arguments, int ranks = 0) {
     const std::string launcher =
-        ranks == 0 ? ""
-                   : std::string(AF_MPIEXEC " --oversubscribe -n ") + std::to_string(ranks) + " ";
+        ranks == 0 ? "" : std::string(AF_MPIEXEC " -n ") + std::to_string(ranks) + " ";
     return run_command(launcher + AF_PROGRAM_FOLDER "/af-evaluate " + arguments);
   }
   /// The words of such a command under mpirun.
   static std::vector<std::string> on_ranks(int ranks, const std::string& arguments) {
-    std::vector<std::string> words = {AF_MPIEXEC,
-                                      "--oversubscribe",
-                                      "-n",
-                                      std::to_string(ranks),
-                                      AF_PROGRAM_FOLDER "/af-evaluate"};
+    std::vector<std::string> words = {
+        AF_MPIEXEC, "-n", std::to_string(ranks), AF_PROGRAM_FOLDER "/af-evaluate"};
     std::istringstream rest(arguments);
     for (std::string word; rest >> word;) words.push_back(word);
     return words;

@@ -101,14 +101,16 @@ class Faults : public testing::Test {
   /// memory are files, too, so messages go through the loopback.
   static std::vector<std::string> on_full_disk(std::vector<std::string> command,
                                                std::uint64_t bytes) {
-    const auto insert_at = [&](const std::string& word, int after, std::vector<std::string> words) {
+    const auto insert_before = [&](const std::string& word, std::vector<std::string> words) {
       const auto found = std::find(command.begin(), command.end(), word);
       ASSERT_NE(found, command.end());
-      command.insert(found + after, words.begin(), words.end());
+      command.insert(found, words.begin(), words.end());
     };
-    insert_at(
-        AF_PROGRAM_FOLDER "/af-precompute", 0, {"prlimit", "--fsize=" + std::to_string(bytes)});
-    insert_at(AF_MPIEXEC, 1, {"--mca", "btl", "self,tcp", "--mca", "btl_tcp_if_include", "lo"});
+    insert_before(AF_PROGRAM_FOLDER "/af-precompute",
+                  {"prlimit", "--fsize=" + std::to_string(bytes)});
+    insert_before(
+        AF_MPIEXEC,
+        {"env", "OMPI_MCA_btl=self,tcp", "OMPI_MCA_btl_tcp_if_include=lo", "MPIR_CVAR_NOLOCAL=1"});
     return command;
   }
 
@@ -166,13 +168,7 @@ TEST_F(Faults, AStoppedRankIsNamedAndTheJobEnded) {
 
 TEST_F(Faults, ARankThatIsStoppedWhileOthersEndDoesNotKeepTheJob) {
   // Rank 1 stops itself. Rank 0 has nothing more to do, and waits for it in MPI_Finalize().
-  test::LaunchedJob job({AF_MPIEXEC,
-                         "--oversubscribe",
-                         "-n",
-                         "2",
-                         AF_STOPPED_RANK_PROGRAM,
-                         "--stall-minutes",
-                         "0.05"},
+  test::LaunchedJob job({AF_MPIEXEC, "-n", "2", AF_STOPPED_RANK_PROGRAM, "--stall-minutes", "0.05"},
                         output());
   EXPECT_EQ(job.wait(kEndsWithin), 75) << said();
   EXPECT_THAT(said(), HasSubstr("(--stall-minutes): the job is ended"));

@@ -10,7 +10,6 @@ fail() {
 # enter_installed ROOT FOLDER_OF_PROGRAMS: enters a scratch folder, removed in the end, where jobs and programs lie below
 # prefix/ as installed, so that the jobs find these programs, whatever they were built as.
 enter_installed() {
-  export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_hwloc_base_binding_policy=none
   scratch=$(mktemp -d)
   trap 'rm -rf "$scratch"' EXIT
   cd "$scratch" || exit

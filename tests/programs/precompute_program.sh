@@ -22,7 +22,6 @@ if [[ -n $sanitized ]]; then
   rank_counts=(2 3 4)
   memory_limit=300
 fi
-export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_hwloc_base_binding_policy=none
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 cd "$scratch"
@@ -60,7 +59,7 @@ planes() { sed -n 's/.*(s,t) plane .* mm, \([0-9]*\) x [0-9]* nodes, \([0-9.]*\)
 same_hash() {
   local ranks=$1 expected=$2
   shift 2
-  "$mpiexec" -n "$ranks" --oversubscribe "$program" "$@" -o ranks.h5 >ranks.txt 2>ranks.err ||
+  "$mpiexec" -n "$ranks" "$program" "$@" -o ranks.h5 >ranks.txt 2>ranks.err ||
     fail "$ranks ranks: $(cat ranks.err)"
   [[ $(hash_of ranks.txt) == "$expected" ]] || fail "another payload on $ranks ranks: $*"
   [[ ! -e ranks.h5.progress && ! -e ranks.h5.partial ]] || fail 'work files are left'
@@ -130,7 +129,9 @@ spacing() {
 # these.
 ranks() {
   hashes=()
-  local i odd=0
+  # Each of the eight designs meets one rank count and one vector width, in an order that ties neither to a size, a caster
+  # or a number of slabs.
+  local turn=0 sizes caster slabs bits
   for sizes in '9 61' '8 64'; do
     for caster in shear-warp trilinear; do
       for slabs in 1 8; do
@@ -139,17 +140,15 @@ ranks() {
         expected=$(hash_of one.txt)
         [[ ${#expected} == 64 ]] || fail "no payload hash: $(cat one.txt)"
         hashes+=("$expected")
-        for bits in 128 256; do
-          grep -q avx2 /proc/cpuinfo || [[ $bits == 128 ]] || continue
+        bits=$((128 << (turn + turn / 2 + turn / 4) % 2))
+        if ((bits == 128)) || grep -q avx2 /proc/cpuinfo; then
           AF_VECTOR_BITS=$bits "$program" "${options[@]}" -o bits.h5 >bits.txt 2>/dev/null
           [[ $(hash_of bits.txt) == "$expected" ]] || fail "another payload with $bits-bit vectors: ${options[*]}"
-        done
-        for ((i = odd; i < ${#rank_counts[@]}; i += 2)); do same_hash "${rank_counts[i]}" "$expected" "${options[@]}"; done
-        odd=$((1 - odd))
+        fi
+        same_hash "${rank_counts[(turn + turn / 4) % ${#rank_counts[@]}]}" "$expected" "${options[@]}"
+        turn=$((turn + 1))
       done
-      odd=$((1 - odd))
     done
-    odd=$((1 - odd))
   done
   # Where the (s,t) plane stands is an option; camera names may be typed in any case.
   for plane in centre centroid; do
@@ -209,7 +208,7 @@ corrections() {
 stops() {
   slow=(--ct ct.mha --rig c-arm-12in --camera AP --uv-nodes 25 --st-nodes 161 --codewords 200)
   slow+=(--max-translation-mm 30 --caster trilinear --step-mm 0.05)
-  "$mpiexec" -n 2 --oversubscribe "$program" "${slow[@]}" -o slow.h5 >slow.txt 2>slow.err &
+  "$mpiexec" -n 2 "$program" "${slow[@]}" -o slow.h5 >slow.txt 2>slow.err &
   job=$!
   for ((i = 0; i < 600; ++i)); do
     [[ -n $(find . -path './slow.h5.progress/*.records' -size +0) ]] && break

@@ -133,10 +133,9 @@ TEST_F(RegisterProgram, SearchesWhereNoStartIsKnown) {
   EXPECT_GT(found.at("start_search").at("rotations").get<int>(), 1);
   EXPECT_TRUE(found.contains("rival"));
 
-  const test::ProgramRun two = test::run_command(
-      "OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 mpirun -n 2 --oversubscribe " +
-      program("af-register") + " --study " + path("study.toml") + " " + search +
-      path("searched-2"));
+  const test::ProgramRun two =
+      test::run_command(AF_MPIEXEC " -n 2 " + program("af-register") + " --study " +
+                        path("study.toml") + " " + search + path("searched-2"));
   ASSERT_EQ(two.exit_code, 0) << two.output;
   const nlohmann::json same = result("searched-2");
   for (const char* key : {"room_from_ct", "start_room_from_ct", "similarity", "verdict", "rival"})
@@ -290,10 +289,9 @@ TEST_F(RegisterProgram, CorrectsEveryStartOfATableOnAnyRankCount) {
     EXPECT_EQ(rows.text(i, "correction_casts"), "1");
     EXPECT_EQ(rows.number(i, "correction_moved_mm"), rows.number(i, "correction_last_mm"));
   }
-  const test::ProgramRun together = test::run_command(
-      "OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 mpirun -n 2 --oversubscribe " +
-      program("af-register") + " --study " + path("study.toml") + " " + fields() + run +
-      path("each-2"));
+  const test::ProgramRun together =
+      test::run_command(AF_MPIEXEC " -n 2 " + program("af-register") + " --study " +
+                        path("study.toml") + " " + fields() + run + path("each-2"));
   ASSERT_EQ(together.exit_code, 0) << together.output;
   const CsvTable shared = CsvTable::read(path("each-2/registrations.csv"));
   for (const std::string& column : rows.columns())
@@ -337,10 +335,9 @@ TEST_F(RegisterProgram, ManyStartsGiveTheSameRowsOnAnyRankCount) {
                                        "1,1,1,1,1,1\n-1,2,0,3,0,2\n40,0,0,0,0,0\n0,0,2,0,-3,0\n";
   const std::string arguments = fields() + " --max-evaluations 80 --starts " + path("starts.csv");
   ASSERT_EQ(run_register(arguments + " -o " + path("serial")).exit_code, 0);
-  const test::ProgramRun shared = test::run_command(
-      "OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 mpirun -n 3 --oversubscribe " +
-      program("af-register") + " --study " + path("study.toml") + arguments + " -o " +
-      path("shared"));
+  const test::ProgramRun shared =
+      test::run_command(AF_MPIEXEC " -n 3 " + program("af-register") + " --study " +
+                        path("study.toml") + arguments + " -o " + path("shared"));
   ASSERT_EQ(shared.exit_code, 0) << shared.output;
   const CsvTable a = CsvTable::read(path("serial/registrations.csv"));
   const CsvTable b = CsvTable::read(path("shared/registrations.csv"));
@@ -661,9 +658,9 @@ TEST_F(RegisterProgram, AStartThatCannotBeSearchedIsNotFound) {
   for (const char* name : {"outside/result.tfm", "outside/pose.toml", "outside/slicer"})
     EXPECT_FALSE(fs::exists(path(name))) << name;
   EXPECT_TRUE(fs::exists(path("outside/AP-overlay.png")));
-  const test::ProgramRun by_ranks = test::run_command(
-      "OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 mpirun -n 2 --oversubscribe " +
-      program("af-register") + " --study " + path("study.toml") + start + path("outside-2"));
+  const test::ProgramRun by_ranks =
+      test::run_command(AF_MPIEXEC " -n 2 " + program("af-register") + " --study " +
+                        path("study.toml") + start + path("outside-2"));
   EXPECT_EQ(by_ranks.exit_code, 7) << by_ranks.output;
 }
 

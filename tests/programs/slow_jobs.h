@@ -9,19 +9,14 @@
 
 namespace af::test {
 
-/// Sets what mpirun needs as root and on few cores, and a vector width that makes training and
-/// encoding slow.
+/// Sets a vector width that makes training and encoding slow.
 inline void prepare_slow_jobs() {
-  setenv("OMPI_ALLOW_RUN_AS_ROOT", "1", 1);
-  setenv("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1", 1);
-  setenv("OMPI_MCA_hwloc_base_binding_policy", "none", 1);
   setenv("AF_VECTOR_BITS", "128", 1);
 }
 
 /// The job yields to the test, so that the test does not miss a moment on a busy machine.
 inline std::vector<std::string> under_mpirun(int ranks, const std::vector<std::string>& command) {
-  std::vector<std::string> all = {
-      "nice", "-n", "5", AF_MPIEXEC, "--oversubscribe", "-n", std::to_string(ranks)};
+  std::vector<std::string> all = {"nice", "-n", "5", AF_MPIEXEC, "-n", std::to_string(ranks)};
   all.insert(all.end(), command.begin(), command.end());
   return all;
 }

@@ -89,7 +89,13 @@ export PATH=$scratch/bin:$PATH
 # submit RUN: submits the chain, output in RUN.
 submit() { "$af_root/jobs/submit.sh" "$scratch/study.toml" --resources "$scratch/resources.sh" --output "$1"; }
 
-no_jobs_left() { [[ -z "$(squeue --noheader)" ]]; }
+queue_is_empty() {
+  local queue
+  queue=$(squeue --noheader) && [[ -z "$queue" ]]
+}
+
+# One empty answer is no proof: a controller that was busy has given one while jobs ran.
+no_jobs_left() { queue_is_empty && sleep 2 && queue_is_empty; }
 
 # Rows without their last column, the seconds.
 rows_of() { sed 's/,[^,]*$//' "$1"/registration/patient-*/registrations.csv; }
@@ -132,6 +138,13 @@ for stage in precompute-1 evaluate; do
 done
 [[ "$(payloads_of "$disturbed")" == "$(payloads_of "$undisturbed")" ]] || fail "the fields differ"
 [[ "$(rows_of "$disturbed")" == "$(rows_of "$undisturbed")" ]] || fail "the rows differ"
+
+# While squeue does not answer, nobody knows whether the chain still runs.
+refused=0
+SLURM_CONF=$scratch/no-slurm.conf submit "$disturbed" >"$scratch/third.log" 2>&1 || refused=$?
+if ((refused != 1)) || ! grep -q 'an earlier chain may still run' "$scratch/third.log"; then
+  fail "a second chain was not refused while squeue does not answer"
+fi
 
 # When the chain runs again, nothing is left to do.
 submit "$disturbed"
