@@ -119,7 +119,7 @@ install_what_builds() { ~guest/attenuation-fields/jobs/install-packages.sh; }
 run_study() { cd attenuation-fields && jobs/local.sh; }
 run_tests() { cd attenuation-fields && tests/run.sh; }
 make_packages() { cd attenuation-fields && cmake --build build/release --target package; }
-compare_without_mpi() { cd attenuation-fields && tests/package/without_mpi.sh; }
+compare_without_mpi() { cd attenuation-fields && tests/package/other_ranks.sh serial; }
 make_wheel() { cd attenuation-fields && cmake --build build/serial --target python-wheel; }
 
 install_ours() {
