@@ -41,10 +41,15 @@ while (($# > 0)); do
   shift
 done
 
+# ask_queue: sets queue, a line "JOB_TASK STATE" for each task that the user has in Slurm.
+ask_queue() {
+  queue=$(squeue --me --array --noheader --format '%F_%K %T') || die 1 "squeue does not say what is queued (see above)"
+}
+
 # task_state STAGE TASK JOB: the state of one array task, in a word or two.
 task_state() {
   local stage=$1 task=$2 job=$3 log="$output/logs/$1-$2.log" state
-  state=$(squeue --noheader --jobs "${job}_$task" --format %T 2>/dev/null || true)
+  state=$(sed -n "s/^${job}_$task //p" <<<"$queue")
   if [[ -n "$state" ]]; then
     echo "${state,,}"
   elif [[ -f "$output/.stages/$stage-$task.done" || ("$stage" == report && -f "$output/report.html") ]]; then
@@ -60,6 +65,7 @@ task_state() {
 print_status() {
   local stage job line task case_name restarts
   [[ -f "$output/jobs/submitted" ]] || die 4 "$output/jobs/submitted: no such file: no chain was submitted there"
+  ask_queue
   while read -r job stage; do
     task=0
     while IFS= read -r line; do
@@ -123,18 +129,16 @@ lines() {
 }
 
 # jobs_of_output: the jobs of this folder that Slurm still has.
-jobs_of_output() {
-  [[ -f "$output/jobs/submitted" ]] || return 0
-  local jobs
-  jobs=$(squeue --me --noheader --format %F) || die 1 "squeue does not say what is queued (see above), so an earlier chain may still run"
-  sort -u <<<"$jobs" | grep -Fx -f <(cut -d ' ' -f 1 "$output/jobs/submitted") || true
-}
+jobs_of_output() { cut -d _ -f 1 <<<"$queue" | sort -u | grep -Fx -f <(cut -d ' ' -f 1 "$output/jobs/submitted") || true; }
 
 output=$(realpath -m "$output")
 if [[ "$dry_run" == no ]]; then
   mkdir -p "$output"/{fields,registration,logs,jobs,.stages}
-  queued=$(jobs_of_output)
-  [[ -z "$queued" ]] || die 3 "$output: an earlier chain is still in the queue: wait for it, or: scancel ${queued//$'\n'/ }"
+  if [[ -f "$output/jobs/submitted" ]]; then
+    ask_queue
+    queued=$(jobs_of_output)
+  fi
+  [[ -z "${queued:-}" ]] || die 3 "$output: an earlier chain is still in the queue: wait for it, or: scancel ${queued//$'\n'/ }"
   rm -f "$output"/.stages/*.fruitless "$output/jobs/submitted"
   [[ "$restart" == no ]] || forget_progress
   cp "$resources" "$output/jobs/resources.sh"

@@ -49,7 +49,6 @@ build_start=$SECONDS
 build_preset "$preset" "$af_root/build/$preset.log"
 say "        $(duration $((SECONDS - build_start)))"
 
-export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
 # In a chroot without /sys, hwloc complains on standard error of every program, which the tests read.
 export HWLOC_HIDE_ERRORS="${HWLOC_HIDE_ERRORS:-2}"
 # Jobs of Open MPI 4.1 that run side by side share a folder, which is named after the machine without its domain. A job that

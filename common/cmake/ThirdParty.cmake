@@ -41,7 +41,7 @@ pkg_check_modules(cairo REQUIRED IMPORTED_TARGET cairo)
 
 # HDF5 strictly by its own pkg-config file, so that ITK's serial HDF5 can never take the parallel one's place.
 if(AF_MPI)
-  pkg_search_module(hdf5 REQUIRED IMPORTED_TARGET hdf5-${af_mpi_name} hdf5)
+  pkg_check_modules(hdf5 REQUIRED IMPORTED_TARGET hdf5-${af_mpi_name})
 else()
   pkg_check_modules(hdf5 REQUIRED IMPORTED_TARGET hdf5-serial)
 endif()

@@ -108,9 +108,7 @@ class Faults : public testing::Test {
     };
     insert_before(AF_PROGRAM_FOLDER "/af-precompute",
                   {"prlimit", "--fsize=" + std::to_string(bytes)});
-    insert_before(
-        AF_MPIEXEC,
-        {"env", "OMPI_MCA_btl=self,tcp", "OMPI_MCA_btl_tcp_if_include=lo", "MPIR_CVAR_NOLOCAL=1"});
+    insert_before(AF_MPIEXEC, {"env", "OMPI_MCA_btl=self,tcp", "OMPI_MCA_btl_tcp_if_include=lo"});
     return command;
   }
 

@@ -24,7 +24,7 @@ constexpr const char* kNoLauncher =
     "env -u OMPI_COMM_WORLD_RANK -u PMIX_RANK -u PMI_RANK -u PMI_FD -u PMI_ID"
     " -u SLURM_STEP_NUM_TASKS ";
 /// With this in its environment, a process ends in MPI_Init().
-constexpr const char* kBrokenMpi = "OMPI_MCA_btl=doesnotexist FI_PROVIDER=doesnotexist ";
+constexpr const char* kBrokenMpi = "OMPI_MCA_btl=doesnotexist ";
 constexpr const char* kMpirun = AF_MPIEXEC " -n 1 ";
 constexpr const char* kInspection = "af-inspect c-arm-12in";
 

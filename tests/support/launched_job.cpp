@@ -26,24 +26,6 @@ bool is_gone(pid_t process) {
   return state >= stat.size() || stat[state] == 'Z';
 }
 
-std::string name_of(pid_t process) {
-  std::ifstream file("/proc/" + std::to_string(process) + "/comm");
-  std::string name;
-  std::getline(file, name);
-  return name;
-}
-
-std::vector<pid_t> children_of(pid_t process) {
-  std::vector<pid_t> children;
-  const std::filesystem::path tasks = "/proc/" + std::to_string(process) + "/task";
-  std::error_code gone;
-  for (const auto& task : std::filesystem::directory_iterator(tasks, gone)) {
-    std::ifstream file(task.path() / "children");
-    for (pid_t child = 0; file >> child;) children.push_back(child);
-  }
-  return children;
-}
-
 }  // namespace
 
 LaunchedJob::LaunchedJob(const std::vector<std::string>& command,
@@ -75,11 +57,14 @@ LaunchedJob::~LaunchedJob() {
 }
 
 std::vector<pid_t> LaunchedJob::ranks() const {
-  std::vector<pid_t> ranks = children_of(launcher_);
-  // MPICH's launcher starts ranks by a proxy of its own.
-  if (ranks.size() == 1 && name_of(ranks.front()) == "hydra_pmi_proxy")
-    ranks = children_of(ranks.front());
-  return ranks;
+  std::vector<pid_t> children;
+  const std::filesystem::path tasks = "/proc/" + std::to_string(launcher_) + "/task";
+  std::error_code gone;
+  for (const auto& task : std::filesystem::directory_iterator(tasks, gone)) {
+    std::ifstream file(task.path() / "children");
+    for (pid_t child = 0; file >> child;) children.push_back(child);
+  }
+  return children;
 }
 
 void LaunchedJob::remember_ranks() {
