@@ -141,7 +141,10 @@ done
 
 # While squeue does not answer, nobody knows whether the chain still runs.
 refused=0
-SLURM_CONF=$scratch/no-slurm.conf submit "$disturbed" >"$scratch/third.log" 2>&1 || refused=$?
+mkdir "$scratch/broken"
+printf '#!/bin/sh\nexit 1\n' >"$scratch/broken/squeue"
+chmod +x "$scratch/broken/squeue"
+PATH=$scratch/broken:$PATH submit "$disturbed" >"$scratch/third.log" 2>&1 || refused=$?
 if ((refused != 1)) || ! grep -q 'squeue does not say what is queued' "$scratch/third.log"; then
   fail "a second chain was not refused while squeue does not answer"
 fi
